@@ -1,0 +1,131 @@
+// The engine: one OpenCL device that computes masks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#ifndef CL_TARGET_OPENCL_VERSION
+#define CL_TARGET_OPENCL_VERSION 120
+#endif
+#include <CL/cl.h>
+
+#include <penumbra/export.hpp>
+#include <penumbra/image.hpp>
+#include <penumbra/scene.hpp>
+#include <penumbra/technique.hpp>
+
+namespace penumbra {
+
+// One step of the work. `ms` is wall time; `device_ms` the time of its kernels and copies by the device's own clock; `bytes` what its
+// kernels and copies had to move at the least.
+struct Stage {
+    std::string name;
+    double ms = 0;
+    double device_ms = 0;
+    std::uint64_t bytes = 0;
+};
+
+// What was done and what it cost. prepare_ms depends on light and occluders alone, shade_ms on the receivers; neither holds file reading
+// and writing, rendering depth from meshes, or compiling kernels: those have stages of their own.
+struct Report {
+    std::string technique;
+    std::vector<std::pair<std::string, SettingValue>> settings;
+    std::string device_name, device_driver;
+    int width = 0, height = 0;
+    double prepare_ms = 0, shade_ms = 0, total_ms = 0;
+    std::vector<Stage> stages;
+    std::uint64_t peak_device_bytes = 0;
+    std::uint64_t pairs = 0; // (occluder texel, receiver) pairs evaluated; 0 where that means nothing
+    std::vector<std::string> warnings;
+};
+
+// Visibility of each receiver pixel, linear, 0 umbra to 1 fully lit; 1 channel, or 3 when the light is textured.
+struct Mask {
+    Image visibility;
+    Report report;
+};
+
+struct DeviceInfo {
+    int index = 0; // in the list that `penumbra info` prints
+    std::string name, vendor, driver, version, platform, type;
+    unsigned compute_units = 0;
+    std::uint64_t global_bytes = 0, max_allocation_bytes = 0, local_bytes = 0;
+    std::size_t max_work_group = 0;
+    unsigned lanes = 0; // receivers a work-item owns (float vector width of our kernels)
+};
+
+// Every OpenCL device there is. Empty when there is none.
+PENUMBRA_API std::vector<DeviceInfo> list_devices();
+
+// Everything that depends on light and occluders alone, on the device. Cheap to copy; keeps its engine's device alive.
+class PENUMBRA_API Prepared {
+public:
+    struct State;
+    explicit Prepared(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+    const State& state() const { return *state_; }
+
+private:
+    std::shared_ptr<const State> state_;
+};
+
+// Receivers whose planar depth is already on the device: float32, row-major, width * height, +infinity or 0 where nothing is there.
+struct DeviceReceivers {
+    CameraSpec camera = LightCamera{};
+    int width = 0, height = 0;
+    cl_mem depth = nullptr;
+};
+
+// Occluder depth that is already on the device, laid out as in DeviceReceivers; `back` may be null.
+struct DeviceOccluders {
+    CameraSpec camera = LightCamera{};
+    int width = 0, height = 0;
+    cl_mem front = nullptr;
+    cl_mem back = nullptr;
+};
+
+// Safe to use from several threads at once.
+class PENUMBRA_API Engine {
+public:
+    Engine();                                      // the device that PENUMBRA_DEVICE selects; without it, the first one
+    explicit Engine(const std::string& selector);  // an index, or a part of a device's name; throws device when none fits
+    Engine(cl_context context, cl_device_id device); // the caller's own; retained
+    ~Engine();
+    Engine(Engine&&) noexcept;
+    Engine& operator=(Engine&&) noexcept;
+
+    const DeviceInfo& device() const;
+
+    // Prepares and shades. Depth images that the technique needs and the scene lacks are rendered from its objects.
+    Mask mask(const Scene& scene) const; // by scene.technique
+    Mask mask(const Scene& scene, const Technique& technique) const;
+
+    // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs the second.
+    Prepared prepare(const Light& light, const Occluders& occluders, const Technique& technique) const;
+    Prepared prepare(const Scene& scene, const Technique& technique) const;
+    Prepared prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const;
+
+    Mask shade(const Prepared& prepared, const Receivers& receivers) const;
+
+    // Device buffer to device buffer: `visibility` is float32, width * height, row-major. Returns when the work is queued on `queue` (of this
+    // engine's context and device, in order).
+    void shade(const Prepared& prepared, const DeviceReceivers& receivers, cl_mem visibility, cl_command_queue queue) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+// The scene with every depth image that `technique` needs in place (rendered from the objects), all cameras resolved.
+PENUMBRA_API Scene with_depth(const Scene& scene, const Technique& technique);
+
+// The report as the JSON of the contract (section 3).
+PENUMBRA_API std::string report_json(const Report& report);
+
+// The program's version, "1.2.3".
+PENUMBRA_API std::string version();
+
+} // namespace penumbra

@@ -1,0 +1,3 @@
+#pragma once
+
+#define PENUMBRA_API __attribute__((visibility("default")))

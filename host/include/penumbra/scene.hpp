@@ -1,0 +1,160 @@
+// A scene: a light, what casts, what receives. Plain data; knows no file format and no device.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <Imath/ImathBox.h>
+#include <Imath/ImathVec.h>
+
+#include <penumbra/export.hpp>
+#include <penumbra/image.hpp>
+
+namespace penumbra {
+
+using Vec2 = Imath::V2d;
+using Vec3 = Imath::V3d;
+
+// --- Lights (lengths in scene units) -----------------------------------------------------------------------------------------
+
+// Shines along normalize(cross(half_v, half_u)). `emission`, when given, lies over the rectangle, left to right along +half_u, top to
+// bottom along -half_v; 1 or 3 channels, not negative, not all zero.
+struct RectangleLight {
+    Vec3 center{0, 0, 0};
+    Vec3 half_u{0, 0, 0}; // orthogonal half-edges
+    Vec3 half_v{0, 0, 0};
+    std::optional<Image> emission;
+};
+
+// Counts as the disc of its radius that faces the receiver.
+struct SphereLight {
+    Vec3 center{0, 0, 0};
+    double radius = 0;
+    Vec3 direction{0, -1, 0};
+    std::optional<Vec3> up;
+};
+
+struct PointLight {
+    Vec3 center{0, 0, 0};
+    Vec3 direction{0, -1, 0};
+    std::optional<Vec3> up;
+};
+
+// A disc of directions of this angular diameter around `direction` (the sun: 0.53 degrees).
+struct DirectionalLight {
+    Vec3 direction{0, -1, 0};
+    double angular_diameter_deg = 0;
+    std::optional<Vec3> up;
+};
+
+using Light = std::variant<RectangleLight, SphereLight, PointLight, DirectionalLight>;
+
+// --- Depth -------------------------------------------------------------------------------------------------------------------
+
+constexpr float nothing_there = std::numeric_limits<float>::infinity();
+
+// Planar depth (distance along the viewing axis, positive, scene units), row 0 at the top; `nothing_there` where there is nothing.
+struct DepthMap {
+    int width = 0;
+    int height = 0;
+    std::vector<float> depth;
+
+    float& at(int x, int y) { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
+    float at(int x, int y) const { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
+};
+
+// --- Cameras -----------------------------------------------------------------------------------------------------------------
+
+// A rigid frame in world space: x right, y up, z backwards (a camera looks along -z). Orthonormal and right-handed.
+struct Frame {
+    Vec3 origin{0, 0, 0};
+    Vec3 x{1, 0, 0};
+    Vec3 y{0, 1, 0};
+    Vec3 z{0, 0, 1};
+};
+
+// A camera that is ready to use.
+struct Camera {
+    Frame frame;
+    bool orthographic = false;
+    Vec2 half_extent{1, 1}; // perspective: tangents of the half angles; orthographic: half the width and height in scene units
+};
+
+// The light's own camera: at its centre, along its axis, image x along +u, image up along +v. What is left out is fitted to the
+// objects that cast and receive (fit_camera).
+struct LightCamera {
+    std::optional<Vec2> tan_half_fov; // every light but a directional one
+    std::optional<Vec2> half_extent;  // directional lights: orthographic
+    std::optional<Vec3> center;       // directional lights: where the image plane's centre is; depth counts from there
+};
+
+// Any other camera. `tan_half_fov.x` of 0: from y and the image's aspect ratio.
+struct PinholeCamera {
+    Frame frame;
+    Vec2 tan_half_fov{0, 0};
+};
+
+using CameraSpec = std::variant<LightCamera, PinholeCamera>;
+
+// --- What casts and what receives ----------------------------------------------------------------------------------------------
+
+// Triangles in world space; three indices a triangle, counter-clockwise seen from outside.
+struct TriangleMesh {
+    std::vector<Imath::V3f> positions;
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+struct Object {
+    std::string name;
+    TriangleMesh mesh;
+    bool casts = true;
+    bool receives = true;
+};
+
+// Depth of what casts shadows, seen from the light. What a technique needs and is not given is rendered from the objects that cast.
+struct Occluders {
+    CameraSpec camera = LightCamera{};
+    int width = 256, height = 256;
+    std::optional<DepthMap> front; // nearest surfaces
+    std::optional<DepthMap> back;  // furthest back-facing surfaces
+    std::vector<DepthMap> layers;  // further surfaces behind `front`, in order of depth
+};
+
+// Depth of what is shaded, from the light or from any other camera. The mask has its resolution and viewpoint.
+struct Receivers {
+    CameraSpec camera = LightCamera{};
+    int width = 512, height = 512;
+    std::optional<DepthMap> depth;
+};
+
+// --- The scene -----------------------------------------------------------------------------------------------------------------
+
+using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
+
+// A technique by name, with the settings that differ from its defaults. technique_from (technique.hpp) makes the typed struct.
+struct TechniqueRequest {
+    std::string kind = "soft_shadow_map";
+    std::vector<std::pair<std::string, SettingValue>> settings;
+};
+
+struct Scene {
+    Light light;
+    std::vector<Object> objects;
+    Occluders occluders;
+    Receivers receivers;
+    TechniqueRequest technique;
+    OutputFormat output;
+    std::vector<std::string> warnings; // what was assumed or looks wrong; copied into the report
+};
+
+// Reads a scene file (JSON, version 1) and every image and mesh that it names, relative to the file.
+// Throws Error naming file and key: not_found, invalid_input, too_large.
+PENUMBRA_API Scene load_scene(const std::string& path);
+
+} // namespace penumbra

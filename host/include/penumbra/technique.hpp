@@ -1,0 +1,54 @@
+// The techniques and their settings.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include <penumbra/export.hpp>
+#include <penumbra/scene.hpp>
+
+namespace penumbra {
+
+enum class ShadowFilter { hard, percentage_closer, bicubic };
+
+// Shadow mapping (Williams 1978) from the light's centre: the baselines that the papers compare with. The light's extent is ignored.
+struct ShadowMap {
+    ShadowFilter filter = ShadowFilter::hard;
+    int taps = 3;      // percentage_closer: taps x taps texels (Reeves et al. 1987)
+    double bias = 1.0; // in units of the bound derived from each texel's slope and the depth's precision
+};
+
+enum class Sides { front, back, both };
+enum class Accumulator { binary32, compensated, binary16 };
+enum class Reduction { area, nearest };
+
+// Soft Shadow Maps (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006): each texel of the occluder map is a micro-patch
+// parallel to the light; its back-projection's share of the light is summed.
+struct SoftShadowMap {
+    Sides sides = Sides::both;                         // 3.5: one map each, merged by the larger occlusion
+    int resolution = 0;                                // texels along the occluder map's longer side; 0: the map as it is
+    Reduction reduction = Reduction::area;             // how a larger map becomes `resolution`
+    Accumulator accumulator = Accumulator::binary32;   // binary16: the blending of Appendix A, for study
+    double bias = 1.0;                                 // in units of the bound derived from each texel's slope and the depth's precision
+    bool project = false;                              // shade in the light's view and sample that mask from the receivers' camera (3.1)
+    int project_resolution = 512;                      // of that mask
+};
+
+// Shadow rays (Embree) through the scene's objects: the reference. Stratified over the light and seeded.
+struct RayTraced {
+    int samples = 256;       // rays a receiver
+    bool adaptive = false;   // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
+    int first_samples = 16;
+    std::int64_t seed = 1;
+};
+
+using Technique = std::variant<ShadowMap, SoftShadowMap, RayTraced>;
+
+// The typed settings of a request, and back. Throws invalid_input for an unknown kind or key (naming the known ones), a value of the
+// wrong type or out of range.
+PENUMBRA_API Technique technique_from(const TechniqueRequest& request);
+PENUMBRA_API TechniqueRequest request_from(const Technique& technique); // every key, with its value
+PENUMBRA_API std::string kind_of(const Technique& technique);
+
+} // namespace penumbra

@@ -1,0 +1,31 @@
+// Images through OpenImageIO, from bytes; the format is decided by the first bytes, never by a name.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <penumbra/image.hpp>
+
+#include "scene/depth.hpp"
+
+namespace penumbra {
+
+// Largest image that is read: width * height * channels samples.
+constexpr std::uint64_t max_image_samples = std::uint64_t{1} << 30;
+
+// A whole image (1, 3 or 4 channels; alpha kept). `where` starts every message.
+Image decode_image(std::span<const std::byte> bytes, std::string_view where);
+
+// One depth channel. `channel` empty: Z, depth.Z, *.Depth.Z, OpenImageIO's own z channel, or the only channel; otherwise an error that lists the channels.
+RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where);
+
+// Reads a file whole. Throws not_found or too_large.
+std::vector<std::byte> read_file(const std::string& path, std::string_view where);
+
+// Writes bytes to a temporary file beside `path`, then renames it. Throws output.
+void write_file(const std::string& path, std::span<const std::byte> bytes);
+
+} // namespace penumbra

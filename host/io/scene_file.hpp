@@ -1,0 +1,46 @@
+// Scene files (JSON, version 1). Knows where names lead only through a Resources object: files for the command line, parts of a request for
+// the server.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <penumbra/scene.hpp>
+
+namespace penumbra {
+
+// Where the names in a scene lead.
+class Resources {
+public:
+    virtual ~Resources() = default;
+    // The bytes of what `name` stands for. Throws not_found.
+    virtual std::vector<std::byte> bytes(const std::string& name) const = 0;
+    // A path for readers that need files (meshes with companions); throws unsupported where there are no files.
+    virtual std::string path(const std::string& name) const = 0;
+};
+
+// Names relative to `folder`.
+class FileResources : public Resources {
+public:
+    explicit FileResources(std::string folder) : folder_(std::move(folder)) {}
+    std::vector<std::byte> bytes(const std::string& name) const override;
+    std::string path(const std::string& name) const override;
+
+private:
+    std::string folder_;
+};
+
+// Parses and loads. Every error names its key ("occluders.depth.front: ...").
+Scene parse_scene(std::string_view json, const Resources& resources);
+
+// A scene file's JSON for `scene`, with its depth images under the given names (empty: left out), cameras explicit. Objects are not written.
+struct DepthNames {
+    std::string front, back, receiver;
+    std::vector<std::string> layers;
+};
+std::string write_scene(const Scene& scene, const DepthNames& names);
+
+} // namespace penumbra

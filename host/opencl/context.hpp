@@ -1,0 +1,52 @@
+// One OpenCL device with its context and its built programs. Shared by everything that computes on it; safe from several threads.
+#pragma once
+
+#define CL_HPP_ENABLE_EXCEPTIONS
+#define CL_HPP_TARGET_OPENCL_VERSION 120
+#define CL_HPP_MINIMUM_OPENCL_VERSION 120
+#include <CL/opencl.hpp>
+
+#include <memory>
+#include <string>
+
+#include <penumbra/engine.hpp>
+
+#include "opencl/quirks.hpp"
+#include "opencl/specialisation.hpp"
+
+namespace penumbra::opencl {
+
+class ProgramCache;
+
+class Context {
+public:
+    // `selector`: an index or a part of a device's name; empty: PENUMBRA_DEVICE, else the first device. Throws Error(device).
+    static std::shared_ptr<Context> open(const std::string& selector);
+    static std::shared_ptr<Context> wrap(cl_context context, cl_device_id device);
+    ~Context();
+
+    const cl::Context& context() const { return context_; }
+    const cl::Device& device() const { return device_; }
+    const DeviceInfo& info() const { return info_; }
+    const Quirks& quirks() const { return quirks_; }
+
+    // A queue of its own for one piece of work: in order, profiling on.
+    cl::CommandQueue queue() const;
+
+    // A kernel object for the caller alone (clSetKernelArg is not thread-safe). Builds its program on first use; time spent building is
+    // added to `compile_ms`. A build failure is Error(device) with the build log's first error line.
+    cl::Kernel kernel(const Specialisation& specialisation, const char* name, double& compile_ms) const;
+
+    // Tests turn this on: every buffer gets a guard tail, checked when the buffer is read or dropped.
+    bool canaries = false;
+
+private:
+    Context(cl::Context context, cl::Device device);
+    cl::Context context_;
+    cl::Device device_;
+    DeviceInfo info_;
+    Quirks quirks_;
+    std::unique_ptr<ProgramCache> programs_;
+};
+
+} // namespace penumbra::opencl

@@ -1,0 +1,25 @@
+// What devices do differently, in one place: every decision that depends on the device or its driver is made here.
+#pragma once
+
+#define CL_HPP_ENABLE_EXCEPTIONS
+#define CL_HPP_TARGET_OPENCL_VERSION 120
+#define CL_HPP_MINIMUM_OPENCL_VERSION 120
+#include <CL/opencl.hpp>
+
+namespace penumbra::opencl {
+
+struct Quirks {
+    // Receivers that one work-item owns. 16 on CPU devices (PoCL does not vectorise loops that accumulate floats across work-items, so the
+    // kernels hold the lanes themselves), 1 on GPUs (the hardware does).
+    int lanes = 1;
+    // Work-items beside each other in a tile of receivers: 1 x 1 with lanes, 16 x 16 without.
+    int tile_group = 16;
+};
+
+// Called before the first OpenCL call of the process: sets what PoCL reads from the environment, unless the user has set it
+// (POCL_SIGFPE_HANDLER, threads from the affinity mask, a private cache folder).
+void prepare_environment();
+
+Quirks quirks_of(const cl::Device& device);
+
+} // namespace penumbra::opencl

@@ -1,0 +1,120 @@
+// One piece of work on one queue: buffers, launches and copies, timed in named stages.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "opencl/context.hpp"
+
+namespace penumbra::opencl {
+
+// Bytes on the device now and at most, of one piece of work and what it keeps.
+struct MemoryMeter {
+    std::uint64_t live = 0, peak = 0;
+};
+
+// `count` elements of T on the device; owns them, moves, does not copy.
+template <class T> class Buffer {
+public:
+    Buffer() = default;
+    Buffer(cl::Buffer memory, std::size_t count, std::shared_ptr<void> guard) : memory_(std::move(memory)), count_(count), guard_(std::move(guard)) {}
+    const cl::Buffer& memory() const { return memory_; }
+    std::size_t count() const { return count_; }
+    std::uint64_t bytes() const { return static_cast<std::uint64_t>(count_) * sizeof(T); }
+    explicit operator bool() const { return memory_() != nullptr; }
+
+private:
+    cl::Buffer memory_;
+    std::size_t count_ = 0;
+    std::shared_ptr<void> guard_; // gives the bytes back to the meter, checks the canary
+};
+
+class Work {
+public:
+    explicit Work(std::shared_ptr<const Context> context);                         // on a queue of its own
+    Work(std::shared_ptr<const Context> context, cl_command_queue queue);          // on the caller's; nothing here then waits for the device
+
+    const Context& context() const { return *context_; }
+    const cl::CommandQueue& queue() const { return queue_; }
+
+    // Room for `count` elements, not initialised. At least one element is allocated. Throws too_large with the numbers when over the device's largest allocation or its memory.
+    template <class T> Buffer<T> buffer(std::size_t count, const char* what)
+    {
+        auto [memory, guard] = allocate(static_cast<std::uint64_t>(count) * sizeof(T), what);
+        return Buffer<T>(std::move(memory), count, std::move(guard));
+    }
+    template <class T> Buffer<T> upload(std::span<const T> data, const char* what)
+    {
+        Buffer<T> buffer = this->buffer<T>(data.size(), what);
+        write(buffer.memory(), data.data(), data.size_bytes());
+        return buffer;
+    }
+    template <class T> std::vector<T> read(const Buffer<T>& buffer)
+    {
+        std::vector<T> data(buffer.count());
+        read(buffer.memory(), data.data(), data.size() * sizeof(T));
+        return data;
+    }
+
+    // Runs a kernel over `global` items (rounded up to `local`, so kernels guard their range). Arguments: Buffers, cl::Buffers, or plain values
+    // (float, int, cl_int2, structs shared with kernels). `bytes`: what it must move at the least, for the report.
+    template <class... Args>
+    void launch(const Specialisation& specialisation, const char* kernel, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
+                std::uint64_t bytes, const Args&... args)
+    {
+        cl::Kernel k = context_->kernel(specialisation, kernel, compile_ms_);
+        cl_uint index = 0;
+        (set_argument(k, kernel, index++, args), ...);
+        enqueue(k, kernel, global, local, bytes);
+    }
+
+    // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name are
+    // joined. What a stage spends building programs is taken out of it and reported as the stage "compile".
+    void stage(const char* name);
+    // Ends the last stage and returns all.
+    std::vector<Stage> finish();
+
+    MemoryMeter& memory() { return *memory_; }
+    // Adds to another meter's account what stays alive (prepared state that this work builds upon).
+    std::shared_ptr<MemoryMeter> memory_ptr() const { return memory_; }
+
+private:
+    std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
+    void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
+    void read(const cl::Buffer& memory, void* data, std::size_t bytes);
+    void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local, std::uint64_t bytes);
+
+    template <class T> void set_argument(cl::Kernel& kernel, const char* name, cl_uint index, const Buffer<T>& buffer)
+    {
+        set_argument_bytes(kernel, name, index, sizeof(cl_mem), &buffer.memory()());
+    }
+    void set_argument(cl::Kernel& kernel, const char* name, cl_uint index, const cl::Buffer& buffer)
+    {
+        set_argument_bytes(kernel, name, index, sizeof(cl_mem), &buffer());
+    }
+    template <class T>
+        requires std::is_trivially_copyable_v<T>
+    void set_argument(cl::Kernel& kernel, const char* name, cl_uint index, const T& value)
+    {
+        set_argument_bytes(kernel, name, index, sizeof(T), &value);
+    }
+    void set_argument_bytes(cl::Kernel& kernel, const char* name, cl_uint index, std::size_t bytes, const void* value);
+
+    std::shared_ptr<const Context> context_;
+    cl::CommandQueue queue_;
+    bool own_queue_ = true;
+    std::shared_ptr<MemoryMeter> memory_ = std::make_shared<MemoryMeter>();
+    double compile_ms_ = 0, total_compile_ms_ = 0;
+    std::vector<Stage> stages_;
+    std::vector<std::pair<std::size_t, cl::Event>> events_; // stage index, event
+    std::size_t current_ = 0;
+    bool running_ = false;
+    std::chrono::steady_clock::time_point started_;
+};
+
+} // namespace penumbra::opencl

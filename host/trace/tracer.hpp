@@ -1,0 +1,59 @@
+// Rays through a scene's objects (Embree, robust mode). Geometry is kept relative to an origin of the caller's choice (the light) so that
+// float32 keeps its digits where they matter.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <penumbra/scene.hpp>
+
+#include "scene/camera.hpp"
+#include "scene/light_space.hpp"
+
+namespace penumbra {
+
+class Tracer {
+public:
+    // Builds a hierarchy of the objects' triangles. Triangles of no area or with coordinates that are not finite are left out and counted.
+    Tracer(std::span<const TriangleMesh* const> meshes, const Vec3& origin);
+    ~Tracer();
+    Tracer(Tracer&&) noexcept;
+
+    std::uint64_t triangle_count() const;
+    std::uint64_t degenerate_count() const;
+    std::uint64_t bytes() const; // of the hierarchy, as Embree's memory monitor counts
+
+    // Depth of what the camera sees through each pixel's centre.
+    DepthMap front(const Camera& camera, int width, int height) const; // nearest surface
+    DepthMap back(const Camera& camera, int width, int height) const;  // furthest back-facing surface (normal along the ray)
+    // Surfaces 0, 1, ... `count` - 1 along each ray in order of depth (0 is `front`). The same hit reported by two triangles that share an edge
+    // counts once.
+    std::vector<DepthMap> layers(const Camera& camera, int width, int height, int count) const;
+
+    struct Impl;
+    const Impl& impl() const { return *impl_; }
+
+private:
+    std::unique_ptr<Impl> impl_;
+};
+
+struct VisibilityOptions {
+    int samples = 256;
+    bool adaptive = false;
+    int first_samples = 16;
+    std::uint64_t seed = 1;
+};
+
+struct VisibilityResult {
+    Image visibility;          // 1 channel, or 3 for a textured light
+    std::uint64_t rays = 0;    // shadow rays cast
+};
+
+// Ray-traced visibility of the light at each pixel of a receiver depth map. Deterministic for a seed, whatever the thread count.
+VisibilityResult trace_visibility(const Tracer& tracer, const Light& light, const DepthMap& receivers, const Camera& camera,
+                                  const VisibilityOptions& options);
+
+
+} // namespace penumbra
