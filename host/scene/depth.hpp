@@ -35,7 +35,8 @@ DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const 
 // than the neighbouring slopes explain. Triangles face the camera.
 TriangleMesh mesh_from_depth(const DepthMap& depth, const Camera& camera);
 
-// Whether two neighbouring texels lie on one surface, from four disparities in a row (`before`, `a`, `b`, `after`; 0: nothing there).
-bool connected(double before, double a, double b, double after);
+// Whether two neighbouring texels a, b lie on one surface, from four disparities in a row (0: nothing there) that are right to the relative
+// `precision`. A plane's disparity is linear across the image, so the step from a to b must be one that the slope on either side explains.
+bool connected(double before, double a, double b, double after, double precision);
 
 } // namespace penumbra

@@ -64,6 +64,7 @@ struct DepthMap {
     int width = 0;
     int height = 0;
     std::vector<float> depth;
+    double precision = 0x1p-24; // largest relative rounding error of a depth: of float32, or of what it was decoded from
 
     float& at(int x, int y) { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
     float at(int x, int y) const { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }

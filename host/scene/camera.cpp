@@ -1,0 +1,166 @@
+#include "scene/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <penumbra/error.hpp>
+
+namespace penumbra {
+namespace {
+
+// The box of what casts or receives, as the light sees it.
+struct LightBox {
+    Imath::Box3d box;            // in light space
+    Vec2 tangent{0, 0};          // largest |x / z| and |y / z| of what lies before the light
+    std::string crosses;         // the first object with a triangle through the light's plane; empty: none
+};
+
+LightBox light_box(const LightFrame& light, const std::vector<Object>& objects)
+{
+    LightBox result;
+    for (const Object& object : objects) {
+        if (!object.casts && !object.receives) continue;
+        for (const auto& triangle : object.mesh.triangles) {
+            Vec3 corner[3];
+            int before = 0;
+            for (int i = 0; i < 3; ++i) {
+                corner[i] = light_from_world(light, Vec3(object.mesh.positions[triangle[static_cast<std::size_t>(i)]]));
+                before += corner[i].z > 0;
+                result.box.extendBy(corner[i]);
+            }
+            // What lies wholly behind the light matters to nobody; what reaches through its plane spans any field of view.
+            if (before == 0) continue;
+            if (before < 3 && result.crosses.empty()) result.crosses = object.name;
+            for (const Vec3& c : corner)
+                if (c.z > 0) result.tangent = {std::max(result.tangent.x, std::abs(c.x / c.z)), std::max(result.tangent.y, std::abs(c.y / c.z))};
+        }
+    }
+    return result;
+}
+
+// One texel wider on every side, so that what lies on the border is inside; never flat.
+Vec2 with_margin(const Vec2& half, int width, int height)
+{
+    const double larger = std::max(half.x, half.y);
+    const Vec2 wide(std::max(half.x, larger * 1e-3), std::max(half.y, larger * 1e-3));
+    return {wide.x * (1 + 2.0 / width), wide.y * (1 + 2.0 / height)};
+}
+
+Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+{
+    const LightBox fit = light_box(light, objects);
+    if (!spec.half_extent && fit.box.isEmpty())
+        throw Error(ErrorCode::invalid_input, std::string(where) + ".half_extent: is missing and there are no objects to fit it to",
+                    "expected two positive lengths");
+
+    Vec3 center = spec.center.value_or(Vec3(0, 0, 0));
+    if (!spec.center && !fit.box.isEmpty()) {
+        // Before everything, by a thousandth of the box's depth, so that every depth is positive.
+        const Vec3 middle = fit.box.center();
+        const double depth = fit.box.max.z - fit.box.min.z;
+        const double step = std::max({depth, fit.box.max.x - fit.box.min.x, fit.box.max.y - fit.box.min.y}) * 1e-3;
+        center = light.u * middle.x + light.v * middle.y + light.direction * (fit.box.min.z - step);
+    }
+    Vec2 half = spec.half_extent.value_or(Vec2(0, 0));
+    if (!spec.half_extent) {
+        const Vec3 c = light_from_world(light, center);
+        const Vec2 reach(std::max(fit.box.max.x - c.x, c.x - fit.box.min.x), std::max(fit.box.max.y - c.y, c.y - fit.box.min.y));
+        half = with_margin(reach, width, height);
+    }
+    return light_camera(light, half, center);
+}
+
+Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+{
+    if (spec.tan_half_fov) return light_camera(light, *spec.tan_half_fov, light.origin);
+
+    const std::string key = std::string(where) + ".tan_half_fov";
+    const LightBox fit = light_box(light, objects);
+    if (fit.tangent.x == 0 && fit.tangent.y == 0)
+        throw Error(ErrorCode::invalid_input, key + ": is missing and there is nothing before the light to fit it to", "expected two positive tangents");
+    if (!fit.crosses.empty())
+        throw Error(ErrorCode::invalid_input, key + ": is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
+                    "expected two positive tangents");
+    return light_camera(light, with_margin(fit.tangent, width, height), light.origin);
+}
+
+} // namespace
+
+Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3& center)
+{
+    return {.frame = {.origin = center, .x = light.u, .y = light.v, .z = -light.direction},
+            .orthographic = light.directional,
+            .half_extent = half_extent};
+}
+
+Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+{
+    Camera camera;
+    if (const auto* pinhole = std::get_if<PinholeCamera>(&spec)) {
+        const Vec2 tangent = pinhole->tan_half_fov;
+        camera = {.frame = pinhole->frame,
+                  .orthographic = false,
+                  .half_extent = {tangent.x != 0 ? tangent.x : tangent.y * width / height, tangent.y}};
+    } else {
+        const LightFrame frame = light_frame(light);
+        const auto& of_light = std::get<LightCamera>(spec);
+        camera = frame.directional ? fit_sun(of_light, frame, objects, width, height, where)
+                                   : fit_light(of_light, frame, objects, width, height, where);
+    }
+    validate(camera, where);
+    return camera;
+}
+
+void validate(const Camera& camera, std::string_view where)
+{
+    const Frame& f = camera.frame;
+    // Matrices arrive as decimal text or float32: 1e-4 is well above both, and bends an image by less than a pixel in 8192.
+    const double tolerance = 1e-4;
+    const double lengths = std::max({std::abs(f.x.length() - 1), std::abs(f.y.length() - 1), std::abs(f.z.length() - 1)});
+    const double angles = std::max({std::abs(f.x.dot(f.y)), std::abs(f.y.dot(f.z)), std::abs(f.z.dot(f.x))});
+    const double handed = (f.x.cross(f.y) - f.z).length();
+    if (!(lengths < tolerance && angles < tolerance && handed < 4 * tolerance))
+        throw Error(ErrorCode::invalid_input, std::string(where) + ".world_from_camera: is not a rigid right-handed frame",
+                    "expected orthogonal axes of length 1, no scale, no mirroring");
+    if (!std::isfinite(f.origin.x) || !std::isfinite(f.origin.y) || !std::isfinite(f.origin.z))
+        throw Error(ErrorCode::invalid_input, std::string(where) + ": the camera's position is not finite", "expected finite numbers");
+    for (const double half : {camera.half_extent.x, camera.half_extent.y})
+        if (!(half > 0) || !std::isfinite(half))
+            throw Error(ErrorCode::invalid_input,
+                        std::string(where) + (camera.orthographic ? ".half_extent: " : ".tan_half_fov: ") + "is " + std::to_string(half),
+                        "expected positive finite numbers: a camera needs a field of view");
+}
+
+Vec3 camera_point(const Camera& camera, int width, int height, double x_px, double y_px, double depth)
+{
+    const double spread = camera.orthographic ? 1 : depth;
+    const double x = (2 * x_px / width - 1) * camera.half_extent.x * spread;
+    const double y = (1 - 2 * y_px / height) * camera.half_extent.y * spread;
+    return {x, y, depth};
+}
+
+Vec3 world_point(const Camera& camera, int width, int height, double x_px, double y_px, double depth)
+{
+    const Vec3 p = camera_point(camera, width, height, x_px, y_px, depth);
+    return camera.frame.origin + camera.frame.x * p.x + camera.frame.y * p.y - camera.frame.z * p.z;
+}
+
+Projected project(const Camera& camera, int width, int height, const Vec3& world)
+{
+    const Vec3 p = world - camera.frame.origin;
+    const double depth = -p.dot(camera.frame.z);
+    const double spread = camera.orthographic ? 1 : depth;
+    return {.x_px = (p.dot(camera.frame.x) / (spread * camera.half_extent.x) + 1) / 2 * width,
+            .y_px = (1 - p.dot(camera.frame.y) / (spread * camera.half_extent.y)) / 2 * height,
+            .depth = depth};
+}
+
+Imath::Box3d bounds(const TriangleMesh& mesh)
+{
+    Imath::Box3d box;
+    for (const auto& p : mesh.positions) box.extendBy(Vec3(p));
+    return box;
+}
+
+} // namespace penumbra
