@@ -1,0 +1,7 @@
+#include <penumbra/engine.hpp>
+
+namespace penumbra {
+
+std::string version() { return PENUMBRA_VERSION; }
+
+} // namespace penumbra
