@@ -11,9 +11,9 @@ namespace {
 
 // The box of what casts or receives, as the light sees it.
 struct LightBox {
-    Imath::Box3d box;            // in light space
-    Vec2 tangent{0, 0};          // largest |x / z| and |y / z| of what lies before the light
-    std::string crosses;         // the first object with a triangle through the light's plane; empty: none
+    Imath::Box3d box;    // in light space
+    Vec2 tangent{0, 0};  // largest |x / z| and |y / z| of what lies before the light
+    std::string crosses; // the first object with a triangle through the light's plane; empty: none
 };
 
 LightBox light_box(const LightFrame& light, const std::vector<Object>& objects)
@@ -33,7 +33,8 @@ LightBox light_box(const LightFrame& light, const std::vector<Object>& objects)
             if (before == 0) continue;
             if (before < 3 && result.crosses.empty()) result.crosses = object.name;
             for (const Vec3& c : corner)
-                if (c.z > 0) result.tangent = {std::max(result.tangent.x, std::abs(c.x / c.z)), std::max(result.tangent.y, std::abs(c.y / c.z))};
+                if (c.z > 0)
+                    result.tangent = {std::max(result.tangent.x, std::abs(c.x / c.z)), std::max(result.tangent.y, std::abs(c.y / c.z))};
         }
     }
     return result;
@@ -47,7 +48,8 @@ Vec2 with_margin(const Vec2& half, int width, int height)
     return {wide.x * (1 + 2.0 / width), wide.y * (1 + 2.0 / height)};
 }
 
-Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height,
+               std::string_view where)
 {
     const LightBox fit = light_box(light, objects);
     if (!spec.half_extent && fit.box.isEmpty())
@@ -71,16 +73,19 @@ Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vect
     return light_camera(light, half, center);
 }
 
-Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height,
+                 std::string_view where)
 {
     if (spec.tan_half_fov) return light_camera(light, *spec.tan_half_fov, light.origin);
 
     const std::string key = std::string(where) + ".tan_half_fov";
     const LightBox fit = light_box(light, objects);
     if (fit.tangent.x == 0 && fit.tangent.y == 0)
-        throw Error(ErrorCode::invalid_input, key + ": is missing and there is nothing before the light to fit it to", "expected two positive tangents");
+        throw Error(ErrorCode::invalid_input, key + ": is missing and there is nothing before the light to fit it to",
+                    "expected two positive tangents");
     if (!fit.crosses.empty())
-        throw Error(ErrorCode::invalid_input, key + ": is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
+        throw Error(ErrorCode::invalid_input,
+                    key + ": is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
                     "expected two positive tangents");
     return light_camera(light, with_margin(fit.tangent, width, height), light.origin);
 }
@@ -94,7 +99,8 @@ Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3
             .half_extent = half_extent};
 }
 
-Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height, std::string_view where)
+Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
+                      std::string_view where)
 {
     Camera camera;
     if (const auto* pinhole = std::get_if<PinholeCamera>(&spec)) {

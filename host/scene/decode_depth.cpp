@@ -9,7 +9,7 @@
 namespace penumbra {
 namespace {
 
-constexpr float far_away = 1e9f;        // at and above this a stored value means nothing there (contract.md, section 2)
+constexpr float far_away = 1e9f;         // at and above this a stored value means nothing there (contract.md, section 2)
 constexpr float half_far_away = 65504.f; // the largest half-float
 
 bool in_unit_range(EncodingKind kind)
@@ -17,15 +17,9 @@ bool in_unit_range(EncodingKind kind)
     return kind == EncodingKind::window || kind == EncodingKind::reversed_window || kind == EncodingKind::normalized;
 }
 
-bool is_integer(SampleType type)
-{
-    return type == SampleType::uint8 || type == SampleType::uint16 || type == SampleType::uint32;
-}
+bool is_integer(SampleType type) { return type == SampleType::uint8 || type == SampleType::uint16 || type == SampleType::uint32; }
 
-double largest_integer(SampleType type)
-{
-    return type == SampleType::uint8 ? 255.0 : type == SampleType::uint16 ? 65535.0 : 4294967295.0;
-}
+double largest_integer(SampleType type) { return type == SampleType::uint8 ? 255.0 : type == SampleType::uint16 ? 65535.0 : 4294967295.0; }
 
 void check_range(const DepthEncoding& encoding, const std::string& where)
 {
@@ -35,9 +29,11 @@ void check_range(const DepthEncoding& encoding, const std::string& where)
         throw Error(ErrorCode::invalid_input, where + ": encoding needs near and far",
                     "expected two lengths; far may be left out of reversed_window alone, where it then is infinite");
     const double lowest = encoding.kind == EncodingKind::normalized ? 0 : std::nextafter(0.0, 1.0);
-    if (!(std::isfinite(*encoding.near) && *encoding.near >= lowest) || (encoding.far && !(*encoding.near < *encoding.far && std::isfinite(*encoding.far))))
+    if (!(std::isfinite(*encoding.near) && *encoding.near >= lowest) ||
+        (encoding.far && !(*encoding.near < *encoding.far && std::isfinite(*encoding.far))))
         throw Error(ErrorCode::invalid_input,
-                    where + ": encoding has near " + std::to_string(*encoding.near) + " and far " + (encoding.far ? std::to_string(*encoding.far) : "infinite"),
+                    where + ": encoding has near " + std::to_string(*encoding.near) + " and far " +
+                        (encoding.far ? std::to_string(*encoding.far) : "infinite"),
                     "expected 0 < near < far");
 }
 
@@ -65,11 +61,16 @@ double decode(double value, const DepthEncoding& encoding)
     const double inverse_far = encoding.far ? 1 / *encoding.far : 0;
     switch (encoding.kind) {
     case EncodingKind::planar:
-    case EncodingKind::radial: return value;
-    case EncodingKind::disparity: return 1 / value;
-    case EncodingKind::window: return 1 / (1 / near + value * (inverse_far - 1 / near));
-    case EncodingKind::reversed_window: return 1 / (inverse_far + value * (1 / near - inverse_far));
-    case EncodingKind::normalized: return near + value * (*encoding.far - near);
+    case EncodingKind::radial:
+        return value;
+    case EncodingKind::disparity:
+        return 1 / value;
+    case EncodingKind::window:
+        return 1 / (1 / near + value * (inverse_far - 1 / near));
+    case EncodingKind::reversed_window:
+        return 1 / (inverse_far + value * (1 / near - inverse_far));
+    case EncodingKind::normalized:
+        return near + value * (*encoding.far - near);
     }
     return value;
 }
@@ -113,7 +114,8 @@ DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const 
         }
         const double value = in_unit_range(encoding.kind) && is_integer(raw.type) ? stored / largest_integer(raw.type) : stored;
         if (in_unit_range(encoding.kind) && (value < 0 || value > 1))
-            throw Error(ErrorCode::invalid_input, at + ": has a stored value of " + std::to_string(value), "expected 0 to 1 in this encoding");
+            throw Error(ErrorCode::invalid_input, at + ": has a stored value of " + std::to_string(value),
+                        "expected 0 to 1 in this encoding");
         on_far_plane += encoding.kind == EncodingKind::window && value == 1;
         double depth = decode(value, encoding) * encoding.scale;
         if (encoding.kind == EncodingKind::radial) {
@@ -122,14 +124,15 @@ DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const 
             depth /= std::sqrt(1 + x * x + y * y);
         }
         if (!(depth > 0))
-            throw Error(ErrorCode::invalid_input, at + ": a stored value of " + std::to_string(stored) + " decodes to depth " + std::to_string(depth),
+            throw Error(ErrorCode::invalid_input,
+                        at + ": a stored value of " + std::to_string(stored) + " decodes to depth " + std::to_string(depth),
                         "expected positive depths; check the encoding");
         // A disparity may stand for a depth beyond float32: as far away as nothing.
         map.depth.push_back(depth > std::numeric_limits<float>::max() ? nothing_there : static_cast<float>(depth));
     }
     if (on_far_plane > 0)
-        warnings.push_back(at + ": " + std::to_string(on_far_plane)
-                           + " pixels are exactly 1, the far plane; if that means nothing there, set \"empty\": 1 in its encoding");
+        warnings.push_back(at + ": " + std::to_string(on_far_plane) +
+                           " pixels are exactly 1, the far plane; if that means nothing there, set \"empty\": 1 in its encoding");
     return map;
 }
 

@@ -25,14 +25,14 @@ struct RawDepth {
     std::vector<float> samples;
 };
 
-// Planar depth from stored samples. `half_extent` are the camera's tangents (for radial). Throws invalid_input, message starting with `where`:
-// near and far missing, not finite or not 0 < near < far; 8-bit samples in an encoding other than normalized, window, reversed_window;
-// a decoded depth that is not positive. Adds warnings (half-float, 8-bit).
+// Planar depth from stored samples. `half_extent` are the camera's tangents (for radial). Throws invalid_input, message starting with
+// `where`: near and far missing, not finite or not 0 < near < far; 8-bit samples in an encoding other than normalized, window,
+// reversed_window; a decoded depth that is not positive. Adds warnings (half-float, 8-bit).
 DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings);
 
-// The surfaces that a camera sees: neighbouring pixel centres joined by triangles, but not across a depth jump: where disparity steps by more
-// than the neighbouring slopes explain. Triangles face the camera.
+// The surfaces that a camera sees: neighbouring pixel centres joined by triangles, but not across a depth jump: where disparity steps by
+// more than the neighbouring slopes explain. Triangles face the camera.
 TriangleMesh mesh_from_depth(const DepthMap& depth, const Camera& camera);
 
 // Whether two neighbouring texels a, b lie on one surface, from four disparities in a row (0: nothing there) that are right to the relative

@@ -10,21 +10,12 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-[[noreturn]] void reject(const std::string& what, const std::string& expected)
-{
-    throw Error(ErrorCode::invalid_input, what, expected);
-}
+[[noreturn]] void reject(const std::string& what, const std::string& expected) { throw Error(ErrorCode::invalid_input, what, expected); }
 
-bool finite(const Vec3& v)
-{
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
+bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // Within 8 degrees of the Y axis the default up is -Z (contract.md, section 2).
-Vec3 default_up(const Vec3& direction)
-{
-    return std::abs(direction.y) > std::cos(8 * degree) ? Vec3(0, 0, -1) : Vec3(0, 1, 0);
-}
+Vec3 default_up(const Vec3& direction) { return std::abs(direction.y) > std::cos(8 * degree) ? Vec3(0, 0, -1) : Vec3(0, 1, 0); }
 
 void set_axes(LightFrame& frame, const Vec3& direction, const std::optional<Vec3>& up)
 {
@@ -68,7 +59,8 @@ LightFrame frame_of(const RectangleLight& light)
 
 void validate_axes(const Vec3& direction, const std::optional<Vec3>& up)
 {
-    if (!finite(direction) || direction.length() == 0) reject("light.direction: has no length", "expected a finite vector that is not zero");
+    if (!finite(direction) || direction.length() == 0)
+        reject("light.direction: has no length", "expected a finite vector that is not zero");
     if (!up) return;
     if (!finite(*up) || up->length() == 0) reject("light.up: has no length", "expected a finite vector that is not zero");
     // Below this sine the side axis would be rounding noise: both inputs carry up to 2^-53 relative error.
@@ -103,7 +95,8 @@ void validate(const RectangleLight& light)
 void validate(const SphereLight& light)
 {
     if (!finite(light.center)) reject("light.center: is not finite", "expected three finite numbers");
-    if (!std::isfinite(light.radius) || light.radius < 0) reject("light.radius: is " + std::to_string(light.radius), "expected 0 or more, finite");
+    if (!std::isfinite(light.radius) || light.radius < 0)
+        reject("light.radius: is " + std::to_string(light.radius), "expected 0 or more, finite");
     validate_axes(light.direction, light.up);
 }
 

@@ -24,8 +24,9 @@ LightFrame light_frame(const Light& light);
 
 std::string kind_of(const Light& light); // "rectangle", "sphere", "point", "directional"
 
-// Throws invalid_input, the message starting with the key ("light.half_u: ..."): extents that are not finite, half-edges not orthogonal (their
-// cosine beyond 1e-5), negative radius, no direction, up along direction, angular diameter outside [0, 180), emission of the wrong kind.
+// Throws invalid_input, the message starting with the key ("light.half_u: ..."): extents that are not finite, half-edges not orthogonal
+// (their cosine beyond 1e-5), negative radius, no direction, up along direction, angular diameter outside [0, 180), emission of the wrong
+// kind.
 void validate(const Light& light);
 
 Vec3 light_from_world(const LightFrame& light, const Vec3& point);

@@ -44,7 +44,8 @@ bool connected(double before, double a, double b, double after, double precision
     // Each disparity is off by up to `precision` of itself: a difference of two by twice that, and a doubled slope by twice that again.
     const double rounding = 6 * precision * std::max(a, b);
     const double step = b - a;
-    return std::abs(step) <= rounding || (before > 0 && explains(a - before, step, rounding)) || (after > 0 && explains(after - b, step, rounding));
+    return std::abs(step) <= rounding || (before > 0 && explains(a - before, step, rounding)) ||
+           (after > 0 && explains(after - b, step, rounding));
 }
 
 TriangleMesh mesh_from_depth(const DepthMap& depth, const Camera& camera)
@@ -63,13 +64,14 @@ TriangleMesh mesh_from_depth(const DepthMap& depth, const Camera& camera)
             mesh.positions.emplace_back(world_point(camera, depth.width, depth.height, x + 0.5, y + 0.5, depth.at(x, y)));
         }
 
-    // Two triangles where all four sides of a cell are joined, the one at a corner where only that corner's two sides are. Counter-clockwise
-    // as the camera sees them.
+    // Two triangles where all four sides of a cell are joined, the one at a corner where only that corner's two sides are.
+    // Counter-clockwise as the camera sees them.
     for (int y = 0; y + 1 < depth.height; ++y)
         for (int x = 0; x + 1 < depth.width; ++x) {
             const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width) + static_cast<std::size_t>(x);
             const std::uint32_t tl = vertex[at], tr = vertex[at + 1];
-            const std::uint32_t bl = vertex[at + static_cast<std::size_t>(depth.width)], br = vertex[at + static_cast<std::size_t>(depth.width) + 1];
+            const std::uint32_t bl = vertex[at + static_cast<std::size_t>(depth.width)],
+                                br = vertex[at + static_cast<std::size_t>(depth.width) + 1];
             const Cell cell = cell_at(d, x, y, depth.precision);
             const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); };
             if (cell.top && cell.bottom && cell.left && cell.right) {

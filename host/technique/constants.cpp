@@ -1,0 +1,31 @@
+#include "technique/constants.hpp"
+
+namespace penumbra {
+
+opencl::Specialisation ReceiversConstants::specialisation() const { return {"receivers.cl", {{"TILE_ROWS", std::to_string(rows)}}}; }
+
+opencl::Specialisation OccludersConstants::specialisation() const { return {"occluders.cl", {}}; }
+
+opencl::Specialisation ShadowMapConstants::specialisation() const { return {"shadow_map.cl", {}}; }
+
+opencl::Specialisation SoftShadowMapConstants::specialisation() const
+{
+    return {"soft_shadow_map.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"ITEM_ROWS", std::to_string(item_rows)},
+             {"TILE_ROWS", std::to_string(rows)},
+             {"ACCUMULATOR", std::to_string(accumulator)}}};
+}
+
+std::vector<opencl::Specialisation> every_specialisation()
+{
+    std::vector<opencl::Specialisation> all{ReceiversConstants{}.specialisation(), OccludersConstants{}.specialisation(),
+                                            ShadowMapConstants{}.specialisation()};
+    for (const int lanes : {1, 8, 16})
+        for (const int accumulator : {0, 1, 2})
+            all.push_back(SoftShadowMapConstants{.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = accumulator}
+                              .specialisation());
+    return all;
+}
+
+} // namespace penumbra

@@ -1,0 +1,38 @@
+// Specialisation constants of every kernel file, typed. One function each makes the text that the build checks and the cache is keyed by.
+#pragma once
+
+#include <vector>
+
+#include "opencl/quirks.hpp"
+#include "opencl/specialisation.hpp"
+
+namespace penumbra {
+
+// Rows of a tile of receivers (see soft_shadow_map.cl; the width is TILE_WIDTH of common/shared.h).
+constexpr int tile_rows = 8;
+
+struct ReceiversConstants {
+    int rows = tile_rows;
+    opencl::Specialisation specialisation() const;
+};
+
+struct OccludersConstants {
+    opencl::Specialisation specialisation() const;
+};
+
+struct ShadowMapConstants {
+    opencl::Specialisation specialisation() const;
+};
+
+struct SoftShadowMapConstants {
+    int lanes = 16;
+    int item_rows = tile_rows;
+    int rows = tile_rows;
+    int accumulator = 0; // in the order of Accumulator
+    opencl::Specialisation specialisation() const;
+};
+
+// What the kernels are built with on some device; the build compiles each.
+std::vector<opencl::Specialisation> every_specialisation();
+
+} // namespace penumbra

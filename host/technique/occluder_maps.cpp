@@ -1,0 +1,58 @@
+#include "technique/occluder_maps.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "technique/constants.hpp"
+
+namespace penumbra {
+namespace {
+
+constexpr double point_light_scale = 1e18;
+
+float light_scale(double tangent, double half_extent)
+{
+    return static_cast<float>(half_extent > 0 ? std::min(tangent / (2 * half_extent), point_light_scale) : point_light_scale);
+}
+
+} // namespace
+
+MapSize reduced_size(int width, int height, int resolution)
+{
+    const int longer = std::max(width, height);
+    if (resolution == 0 || resolution >= longer) return {width, height};
+    const auto scaled = [&](int side) {
+        return std::max(1, static_cast<int>(std::lround(static_cast<double>(side) * resolution / longer)));
+    };
+    return {scaled(width), scaled(height)};
+}
+
+OccluderView occluder_view(const OccluderDepth& depth, MapSize size)
+{
+    return {.width = size.width,
+            .height = size.height,
+            .texel_x = 2.0f / static_cast<float>(size.width),
+            .texel_y = 2.0f / static_cast<float>(size.height),
+            .light_scale_x = light_scale(depth.camera.half_extent.x, depth.light.half_u),
+            .light_scale_y = light_scale(depth.camera.half_extent.y, depth.light.half_v)};
+}
+
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction)
+{
+    const std::size_t count = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+    const std::size_t source = static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height);
+    const std::array<std::size_t, 2> grid{static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)};
+    const cl_int2 from_size{{from.width, from.height}}, to_size{{size.width, size.height}};
+    const opencl::Specialisation program = OccludersConstants{}.specialisation();
+
+    OccluderMap map{.texels = work.buffer<cl_float2>(count, "occluder texels"), .steps = work.buffer<cl_float2>(count, "occluder slopes")};
+    if (from.width == size.width && from.height == size.height)
+        work.launch(program, "disparity_from_depth", grid, {16, 8}, count * 12, to_size, depth, map.texels);
+    else
+        work.launch(program, reduction == Reduction::area ? "reduce_area" : "reduce_nearest", grid, {16, 8}, source * 4 + count * 8,
+                    from_size, depth, to_size, map.texels);
+    work.launch(program, "slope_steps", grid, {16, 8}, count * 16, to_size, map.texels, map.steps);
+    return map;
+}
+
+} // namespace penumbra

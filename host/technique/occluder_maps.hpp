@@ -1,0 +1,41 @@
+// Occluder maps on the device: what depth-map techniques prepare from.
+#pragma once
+
+#include <penumbra/technique.hpp>
+
+#include "common/shared.h"
+#include "opencl/work.hpp"
+#include "scene/camera.hpp"
+#include "scene/light_space.hpp"
+
+namespace penumbra {
+
+// Planar depth as uploaded, with the view it was taken from. `back` may be empty.
+struct OccluderDepth {
+    LightFrame light;
+    Camera camera; // the light's own view
+    int width = 0, height = 0;
+    double precision = 0; // relative, of the depths
+    cl::Buffer front, back;
+};
+
+// One map, ready to be shaded with.
+struct OccluderMap {
+    opencl::Buffer<cl_float2> texels; // (disparity, covered share)
+    opencl::Buffer<cl_float2> steps;  // disparity steps of the surface to the next texel
+};
+
+// The map's width and height when its longer side is `resolution` (0, or more than it has: as it is).
+struct MapSize {
+    int width, height;
+};
+MapSize reduced_size(int width, int height, int resolution);
+
+// k of algorithms.md for both axes. A light of no extent counts as one so small that every back-projected texel edge lies far outside it or
+// far inside the texel: 10^18 lights across at a disparity step of 1.
+OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
+
+// Disparity and covered share at `size`, and the surface's steps.
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction);
+
+} // namespace penumbra

@@ -1,0 +1,56 @@
+#include "technique/receiver_points.hpp"
+
+#include "technique/constants.hpp"
+
+namespace penumbra {
+namespace {
+
+int padded(int size, int multiple) { return (size + multiple - 1) / multiple * multiple; }
+
+} // namespace
+
+ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view)
+{
+    ReceiverView view{};
+
+    // Light space has the light camera's x and y, and z along its view. A camera's own (x, y, depth) has z along the view, too. The
+    // difference of origins is taken in double precision, so that scenes far from the world's origin keep their digits.
+    const Frame& to = light_view.frame;
+    const Frame& from = camera.frame;
+    const Vec3 axes_to[3] = {to.x, to.y, -to.z};
+    const Vec3 axes_from[3] = {from.x, from.y, -from.z};
+    const Vec3 offset = from.origin - to.origin;
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            view.light_from_camera[4 * row + column] = static_cast<float>(axes_to[row].dot(axes_from[column]));
+        view.light_from_camera[4 * row + 3] = static_cast<float>(axes_to[row].dot(offset));
+    }
+
+    view.camera_extent_x = static_cast<float>(camera.half_extent.x);
+    view.camera_extent_y = static_cast<float>(camera.half_extent.y);
+    view.light_extent_x = static_cast<float>(light_view.half_extent.x);
+    view.light_extent_y = static_cast<float>(light_view.half_extent.y);
+    view.camera_orthographic = camera.orthographic;
+    view.light_orthographic = light_view.orthographic;
+    view.width = width;
+    view.height = height;
+    view.stride = padded(width, TILE_WIDTH);
+    view.rows = padded(height, tile_rows);
+    return view;
+}
+
+ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision)
+{
+    const std::size_t count = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.rows);
+    ReceiverPoints points{.view = view,
+                          .precision = precision,
+                          .xi = work.buffer<float>(count, "receivers' xi"),
+                          .eta = work.buffer<float>(count, "receivers' eta"),
+                          .d = work.buffer<float>(count, "receivers' disparity")};
+    work.launch(ReceiversConstants{}.specialisation(), "receivers_from_depth",
+                {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8}, count * 16, view, depth, points.xi,
+                points.eta, points.d);
+    return points;
+}
+
+} // namespace penumbra

@@ -1,0 +1,24 @@
+// Receivers as light-space points on the device: what every technique shades.
+#pragma once
+
+#include <penumbra/scene.hpp>
+
+#include "common/shared.h"
+#include "opencl/work.hpp"
+
+namespace penumbra {
+
+// Padded lists, `view.rows` x `view.stride`.
+struct ReceiverPoints {
+    ReceiverView view{};
+    double precision = 0; // of the depth they came from, relative
+    opencl::Buffer<float> xi, eta, d;
+};
+
+// The transform from `camera` to the space of the light's own view.
+ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view);
+
+// Launches receivers_from_depth on a depth map that is on the device.
+ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision);
+
+} // namespace penumbra

@@ -1,0 +1,97 @@
+// Occluder maps: depth to disparity, area-correct reduction, and the pyramid that finds the few texels that matter.
+#include "common/shared.h"
+
+inline float disparity_of(const float depth)
+{
+    // Positive and finite, tested on the bits: anything else is nothing there.
+    return as_int(depth) > 0 && as_int(depth) < 0x7f800000 ? 1.0f / depth : 0.0f;
+}
+
+// disparity_from_depth: a map as it is.
+//
+//   depth  [height][width]  planar depth; not finite or not positive: nothing there
+//   texels [height][width]  (disparity, share of the texel that is covered: 1 or 0)
+__kernel void disparity_from_depth(const int2 size, __global const float* restrict depth, __global float2* restrict texels)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const float d = disparity_of(depth[y * size.x + x]);
+    texels[y * size.x + x] = (float2)(d, d > 0.0f ? 1.0f : 0.0f);
+}
+
+// reduce_area: a larger map at a lower resolution, area-correct.
+//
+//   texels [size.y][size.x]  (mean disparity of what covers the texel, share of the texel that is covered, 0 to 1)
+//
+// Every texel of the larger map counts by the area that it shares with the smaller one's, so any ratio of sizes works. Disparity is
+// averaged, not depth: a tilted plane's disparity is linear across the image, so its mean is the plane's disparity at the texel's centre.
+__kernel void reduce_area(const int2 from, __global const float* restrict depth, const int2 size, __global float2* restrict texels)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+
+    const float2 ratio = convert_float2(from) / convert_float2(size);
+    const float2 low = (float2)(x, y) * ratio, high = (float2)(x + 1, y + 1) * ratio;
+    const int2 first = max(convert_int2_rtn(low), (int2)(0)), last = min(convert_int2_rtp(high), from);
+    float sum = 0.0f, covered = 0.0f, whole = 0.0f;
+    for (int j = first.y; j < last.y; ++j) {
+        const float share_y = fmin(high.y, (float)(j + 1)) - fmax(low.y, (float)j);
+        for (int i = first.x; i < last.x; ++i) {
+            const float share = share_y * (fmin(high.x, (float)(i + 1)) - fmax(low.x, (float)i));
+            const float d = disparity_of(depth[j * from.x + i]);
+            sum = fma(share, d, sum);
+            covered += d > 0.0f ? share : 0.0f;
+            whole += share;
+        }
+    }
+    // Sums of slivers may round a covered share of nothing to above nothing and one of all to below all.
+    texels[y * size.x + x] = covered > 0.0f ? (float2)(sum / covered, fmin(covered / whole, 1.0f)) : (float2)(0.0f);
+}
+
+// reduce_nearest: the texel of the larger map that holds the centre.
+__kernel void reduce_nearest(const int2 from, __global const float* restrict depth, const int2 size, __global float2* restrict texels)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const int i = min((int)(((2 * (long)x + 1) * from.x) / (2 * (long)size.x)), from.x - 1);
+    const int j = min((int)(((2 * (long)y + 1) * from.y) / (2 * (long)size.y)), from.y - 1);
+    const float d = disparity_of(depth[j * from.x + i]);
+    texels[y * size.x + x] = (float2)(d, d > 0.0f ? 1.0f : 0.0f);
+}
+
+// nearest_of_texels: the pyramid's first level: the greatest disparity in each block of BLOCK x BLOCK texels; 0: the block is empty.
+__kernel void nearest_of_texels(const int2 size, __global const float2* restrict texels, const int2 blocks, __global float* restrict nearest)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= blocks.x || y >= blocks.y) return;
+    float d = 0.0f;
+    for (int j = y * BLOCK; j < min((y + 1) * BLOCK, size.y); ++j)
+        for (int i = x * BLOCK; i < min((x + 1) * BLOCK, size.x); ++i) d = fmax(d, texels[j * size.x + i].x);
+    nearest[y * blocks.x + x] = d;
+}
+
+// nearest_of_blocks: each further level, from the one below.
+__kernel void nearest_of_blocks(const int2 size, __global const float* restrict below, const int2 blocks, __global float* restrict nearest)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= blocks.x || y >= blocks.y) return;
+    float d = 0.0f;
+    for (int j = y * BLOCK; j < min((y + 1) * BLOCK, size.y); ++j)
+        for (int i = x * BLOCK; i < min((x + 1) * BLOCK, size.x); ++i) d = fmax(d, below[j * size.x + i]);
+    nearest[y * blocks.x + x] = d;
+}
+
+// slope_steps: how much the surface's disparity changes from one texel to the next, across and down: the smaller of the two one-sided
+// differences, so that a silhouette does not count as a slope. 0 where neither neighbour is there.
+__kernel void slope_steps(const int2 size, __global const float2* restrict texels, __global float2* restrict steps)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const int at = y * size.x + x;
+    const float d = texels[at].x;
+    const float left = x > 0 ? texels[at - 1].x : 0.0f, right = x + 1 < size.x ? texels[at + 1].x : 0.0f;
+    const float up = y > 0 ? texels[at - size.x].x : 0.0f, down = y + 1 < size.y ? texels[at + size.x].x : 0.0f;
+    const float across = fmin(left > 0.0f ? fabs(d - left) : NO_RECEIVER, right > 0.0f ? fabs(d - right) : NO_RECEIVER);
+    const float along = fmin(up > 0.0f ? fabs(d - up) : NO_RECEIVER, down > 0.0f ? fabs(d - down) : NO_RECEIVER);
+    steps[at] = d > 0.0f ? (float2)(across < NO_RECEIVER ? across : 0.0f, along < NO_RECEIVER ? along : 0.0f) : (float2)(0.0f);
+}

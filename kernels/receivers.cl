@@ -1,0 +1,95 @@
+// Receivers as light-space points (xi, eta, d), whichever camera saw them, and what tiles of them hold.
+#include "common/shared.h"
+
+// receivers_from_depth: one light-space point a pixel (algorithms.md, "Light space").
+//
+//   depth  [height][width]   planar depth from the receivers' camera, scene units; not finite or not positive: nothing there
+//   xi, eta, d [rows][stride] light-space points; d = NO_RECEIVER for the padding, for nothing there, and behind the light's plane
+//
+// Launched over stride x rows. For the light's own view the transform is the identity and (xi, eta) are the pixels' centres.
+__kernel void receivers_from_depth(const ReceiverView view, __global const float* restrict depth, __global float* restrict xi,
+                                   __global float* restrict eta, __global float* restrict d)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= view.stride || y >= view.rows) return;
+
+    // The point as the camera sees it; integer tests on the bits, so that no compiler option can fold them away.
+    const bool inside = x < view.width && y < view.height;
+    const float z = inside ? depth[y * view.width + x] : 0.0f;
+    const bool there = inside && as_int(z) > 0 && as_int(z) < 0x7f800000;
+    const float spread = view.camera_orthographic ? 1.0f : z;
+    const float px = ((2 * x + 1 - view.width) / (float)view.width) * view.camera_extent_x * spread;
+    const float py = ((view.height - 2 * y - 1) / (float)view.height) * view.camera_extent_y * spread;
+
+    // The same point in light space.
+    const float* m = view.light_from_camera;
+    const float lx = fma(m[0], px, fma(m[1], py, fma(m[2], z, m[3])));
+    const float ly = fma(m[4], px, fma(m[5], py, fma(m[6], z, m[7])));
+    const float lz = fma(m[8], px, fma(m[9], py, fma(m[10], z, m[11])));
+    const bool before = there && lz > 0.0f;
+
+    const float scale_x = view.light_orthographic ? view.light_extent_x : lz * view.light_extent_x;
+    const float scale_y = view.light_orthographic ? view.light_extent_y : lz * view.light_extent_y;
+    const int at = y * view.stride + x;
+    xi[at] = before ? lx / scale_x : 0.0f;
+    eta[at] = before ? ly / scale_y : 0.0f;
+    d[at] = before ? 1.0f / lz : NO_RECEIVER;
+}
+
+// tile_bounds: the box of light-space points that a tile of TILE_WIDTH x TILE_ROWS receivers holds.
+//
+//   nearest            the greatest disparity of the occluder map
+//   half_inverse_scale 1 / (2 k), of algorithms.md
+//   bounds [tiles][8]  least and greatest xi, eta, d; the number of receivers; the number of those that see part of the light through space
+//                      between them and the nearest occluder that the occluder map does not show. Without receivers: d from NO_RECEIVER to 0.
+//
+// Launched over the tiles, tiles_x x tiles_y.
+__kernel void tile_bounds(const ReceiverView view, const float nearest, const float2 half_inverse_scale, __global const float* restrict xi,
+                          __global const float* restrict eta, __global const float* restrict d, __global float8* restrict bounds)
+{
+    const int tile_x = get_global_id(0), tile_y = get_global_id(1);
+    const int tiles_x = view.stride / TILE_WIDTH;
+    if (tile_x >= tiles_x || tile_y >= view.rows / TILE_ROWS) return;
+
+    float8 box = (float8)(NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, 0.0f, 0.0f, 0.0f);
+    for (int row = 0; row < TILE_ROWS; ++row)
+        for (int column = 0; column < TILE_WIDTH; ++column) {
+            const int at = (tile_y * TILE_ROWS + row) * view.stride + tile_x * TILE_WIDTH + column;
+            if (d[at] == NO_RECEIVER) continue;
+            box.s0 = fmin(box.s0, xi[at]);
+            box.s1 = fmax(box.s1, xi[at]);
+            box.s2 = fmin(box.s2, eta[at]);
+            box.s3 = fmax(box.s3, eta[at]);
+            box.s4 = fmin(box.s4, d[at]);
+            box.s5 = fmax(box.s5, d[at]);
+            box.s6 += 1.0f;
+
+            // The light as seen from here covers the map's plane at `nearest` to this far from the receiver.
+            const float rise = fmax(nearest - d[at], 0.0f);
+            box.s7 += nearest > d[at] && (fabs(xi[at]) + rise * half_inverse_scale.x > 1.0f || fabs(eta[at]) + rise * half_inverse_scale.y > 1.0f) ? 1.0f : 0.0f;
+        }
+    bounds[tile_y * tiles_x + tile_x] = box;
+}
+
+// sample_mask: a light-space mask seen from the receivers (Soft Shadow Maps, 3.1: "projected onto the scene").
+//
+//   mask [mask_size.y][mask_size.x]  visibility over the light's view, row 0 at the top
+//   visibility [height][width]       bilinear between the four nearest mask texels; 1 where nothing is, or outside the light's view
+__kernel void sample_mask(const ReceiverView view, __global const float* restrict xi, __global const float* restrict eta,
+                          __global const float* restrict d, const int2 mask_size, __global const float* restrict mask,
+                          __global float* restrict visibility)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= view.width || y >= view.height) return;
+    const int at = y * view.stride + x;
+    const bool seen = d[at] != NO_RECEIVER && fabs(xi[at]) <= 1.0f && fabs(eta[at]) <= 1.0f;
+
+    // Between texel centres; beyond the outermost centres the border texel holds.
+    const float2 position = seen ? (float2)((xi[at] + 1.0f) * 0.5f * mask_size.x - 0.5f, (1.0f - eta[at]) * 0.5f * mask_size.y - 0.5f) : (float2)(0.0f);
+    const int2 low = convert_int2_rtn(position);
+    const float2 part = position - convert_float2(low);
+    const int2 a = clamp(low, (int2)(0), mask_size - 1), b = clamp(low + 1, (int2)(0), mask_size - 1);
+    const float top = mix(mask[a.y * mask_size.x + a.x], mask[a.y * mask_size.x + b.x], part.x);
+    const float bottom = mix(mask[b.y * mask_size.x + a.x], mask[b.y * mask_size.x + b.x], part.x);
+    visibility[y * view.width + x] = seen ? mix(top, bottom, part.y) : 1.0f;
+}

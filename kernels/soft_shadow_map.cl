@@ -1,0 +1,176 @@
+// Soft Shadow Maps: micro-patch back-projection (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006, Section 3).
+//
+// Specialisation constants
+//   LANES        receivers that a work-item holds in a vector: 16 or 8 on CPU devices, 1 on GPUs
+//   ITEM_ROWS    rows of receivers that a work-item owns: TILE_ROWS on CPU devices, 1 on GPUs
+//   TILE_ROWS    rows of a tile; a tile is TILE_WIDTH x TILE_ROWS receivers and shares one search
+//   ACCUMULATOR  0 binary32, 1 compensated (Kahan), 2 binary16 (emulated; Appendix A)
+//
+// Precision: strict IEEE arithmetic, one correctly rounded division a pair. Each share of the light is off by at most 2^-21 (tests/oracle).
+#include "common/shared.h"
+#include "common/lanes.clh"
+#include "common/half_rounding.clh"
+
+// receiver_limits: from which disparity on an occluder counts for a receiver.
+//
+//   limit [rows][stride]  d + bias; a texel shadows the receiver where its disparity is greater
+//
+// A receiver on the occluder map's own surface must not be shadowed by the stairs that the micro-patches make of that surface. Take the
+// surface as a plane with disparity steps (sx, sy) a texel, the receiver on it, and D = d_texel - d_receiver. A texel reaches the light only
+// where |a - xi| <= h/2 + D/(2k) on both axes (the penumbra extent), and D = gx (a - xi) + gy (b - eta), so with g h = s
+//     D (1 - sx / (2 kx hx) - sy / (2 ky hy)) <= (sx + sy) / 2.
+// No texel of the plane counts, then, if the limit is that far above. Where the bracket is not positive the light's own plane is edge-on to
+// the surface and no bound exists; it is held at 1/4 (a bias of two texel steps).
+// A receiver is on the surface when its own texel's disparity differs by no more than one step each way can explain.
+// Elsewhere only rounding counts: both disparities are right to a few units in the last place and to the depth's own `precision`.
+__kernel void receiver_limits(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision,
+                              __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
+                              __global const float* restrict eta, __global const float* restrict d, __global float* restrict limit)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= receivers.stride || y >= receivers.rows) return;
+    const int at = y * receivers.stride + x;
+    const float own = d[at];
+    if (own == NO_RECEIVER) {
+        limit[at] = NO_RECEIVER;
+        return;
+    }
+
+    const float rounding = (8.0f * 0x1p-24f + 2.0f * precision) * own;
+    const float column = (xi[at] + 1.0f) / occluders.texel_x, row = (1.0f - eta[at]) / occluders.texel_y;
+    const bool inside = column >= 0.0f && row >= 0.0f && column < (float)occluders.width && row < (float)occluders.height;
+    const int texel = inside ? (int)row * occluders.width + (int)column : 0;
+    const float surface = inside ? texels[texel].x : 0.0f;
+    const float2 step = inside ? steps[texel] : (float2)(0.0f);
+
+    const bool on_surface = surface > 0.0f && fabs(surface - own) <= step.x + step.y + rounding;
+    const float bracket = 1.0f - 0.5f * (step.x / (occluders.light_scale_x * occluders.texel_x) + step.y / (occluders.light_scale_y * occluders.texel_y));
+    const float slope = 0.5f * (step.x + step.y) / fmax(bracket, 0.25f);
+    limit[at] = own + rounding + (on_surface ? bias * slope : 0.0f);
+}
+
+#if ACCUMULATOR == 0
+#define ACCUMULATE(sum, lost, share) (sum) += (share)
+#elif ACCUMULATOR == 1
+// Kahan: `lost` carries what rounding took from the sum so far.
+#define ACCUMULATE(sum, lost, share)                                                                                                               \
+    {                                                                                                                                              \
+        const floatn wanted = (share) - (lost);                                                                                                    \
+        const floatn next = (sum) + wanted;                                                                                                        \
+        (lost) = (next - (sum)) - wanted;                                                                                                          \
+        (sum) = next;                                                                                                                              \
+    }
+#else
+// Blending into a 16-bit buffer: the fragment's value and the sum are both rounded to binary16.
+#define ACCUMULATE(sum, lost, share) (sum) = round_to_half((sum) + round_to_half(share))
+#endif
+
+// Whether a block of texels from (a0, b0) to (a1, b1), none nearer to the light than `nearest`, can hide any of the light from any receiver
+// of a tile: its penumbra extent on the furthest receivers (algorithms.md: e = (d - d_p) / (2 k)) meets the tile's box. The extent is widened
+// by 2^-20, which covers the rounding of this test and of the pairs it spares: a texel that it drops would have added exactly 0.
+inline bool reaches(const float nearest, const float a0, const float a1, const float b0, const float b1, const float8 box, const float2 half_inverse_scale)
+{
+    const float rise = nearest - box.s4;
+    if (!(rise > 0.0f)) return false;
+    const float ex = rise * half_inverse_scale.x, ey = rise * half_inverse_scale.y;
+    const float wide_x = fma(0x1p-20f, 1.0f + ex, ex), wide_y = fma(0x1p-20f, 1.0f + ey, ey);
+    return a0 - wide_x <= box.s1 && a1 + wide_x >= box.s0 && b0 - wide_y <= box.s3 && b1 + wide_y >= box.s2;
+}
+
+// What a work-item knows of its tile and sums for its receivers.
+typedef struct {
+    __private floatn* sum;
+    __private floatn* lost;
+    __global const float* xi;
+    __global const float* eta;
+    __global const float* d;
+    __global const float* limit;
+    int first, stride; // of the work-item's receivers in the lists
+} Receivers;
+
+// Adds one texel's share of the light for every receiver of the work-item (3.4 and 4.2: back-project, intersect, multiply).
+//     u(a) = 1/2 + (a - xi) k / (d - d_p)      on a light scaled to [0, 1]
+inline void add_patch(Receivers* r, const float2 texel, const float a0, const float a1, const float b0, const float b1, const float2 scale)
+{
+    for (int row = 0; row < ITEM_ROWS; ++row) {
+        const int at = r->first + row * r->stride;
+        const floatn xi = load_lanes(r->xi + at), eta = load_lanes(r->eta + at), own = load_lanes(r->d + at), limit = load_lanes(r->limit + at);
+
+        const floatn reach = 1.0f / (texel.x - own);
+        const floatn du = scale.x * reach, dv = scale.y * reach;
+        const floatn u = saturate(fma(a1 - xi, du, (floatn)(0.5f))) - saturate(fma(a0 - xi, du, (floatn)(0.5f)));
+        const floatn v = saturate(fma(b1 - eta, dv, (floatn)(0.5f))) - saturate(fma(b0 - eta, dv, (floatn)(0.5f)));
+        const floatn share = select_lanes((floatn)(0.0f), u * v * texel.y, texel.x > limit);
+        ACCUMULATE(r->sum[row], r->lost[row], share);
+    }
+}
+
+// soft_shadow_map: the share of the light that each receiver sees past the micro-patches of one occluder map.
+//
+//   texels [height][width]      (disparity, covered share) of the occluder map; blocks, superblocks: its pyramid's two levels
+//   bounds [tiles]              boxes of the tiles of receivers
+//   visibility [height][width]  1 - occlusion, 0 to 1. With `merge` the smaller of that and what is there (3.5: the larger occlusion of two maps)
+//   evaluated [tiles]           texels that were evaluated against the tile's receivers, added to what is there with `merge`
+//
+// Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Texels are added in one order, whatever the tile, so the same receiver
+// gets the same bits under any tiling.
+__kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, __global const float2* restrict texels,
+                              __global const float* restrict blocks, __global const float* restrict superblocks,
+                              __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
+                              __global const float* restrict d, __global const float* restrict limit, __global float* restrict visibility,
+                              __global uint* restrict evaluated)
+{
+    const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
+    if (x >= receivers.stride || y >= receivers.rows) return;
+    const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
+    const float8 box = bounds[tile];
+
+    floatn sum[ITEM_ROWS], lost[ITEM_ROWS];
+    for (int row = 0; row < ITEM_ROWS; ++row) sum[row] = lost[row] = (floatn)(0.0f);
+    Receivers mine = {sum, lost, xi, eta, d, limit, y * receivers.stride + x, receivers.stride};
+
+    const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
+    const float2 half_inverse_scale = 0.5f / scale;
+    const float2 texel = (float2)(occluders.texel_x, occluders.texel_y);
+    const int2 size = (int2)(occluders.width, occluders.height);
+    const int2 block_count = (size + (BLOCK - 1)) / BLOCK;
+    const int2 super_count = (block_count + (BLOCK - 1)) / BLOCK;
+    uint count = 0;
+
+    // Down the pyramid: superblocks, blocks, texels. Edge i of the map lies at xi = i * texel_x - 1 and at eta = 1 - i * texel_y.
+    for (int s = 0; s < super_count.x * super_count.y; ++s) {
+        const int2 super = (int2)(s % super_count.x, s / super_count.x);
+        const int2 first_block = super * BLOCK, last_block = min(first_block + BLOCK, block_count);
+        const int2 low = first_block * BLOCK, high = min(last_block * BLOCK, size);
+        if (!reaches(superblocks[s], low.x * texel.x - 1.0f, high.x * texel.x - 1.0f, 1.0f - high.y * texel.y, 1.0f - low.y * texel.y, box, half_inverse_scale))
+            continue;
+        for (int by = first_block.y; by < last_block.y; ++by)
+            for (int bx = first_block.x; bx < last_block.x; ++bx) {
+                const int2 from = (int2)(bx, by) * BLOCK, to = min(from + BLOCK, size);
+                if (!reaches(blocks[by * block_count.x + bx], from.x * texel.x - 1.0f, to.x * texel.x - 1.0f, 1.0f - to.y * texel.y,
+                             1.0f - from.y * texel.y, box, half_inverse_scale))
+                    continue;
+                for (int j = from.y; j < to.y; ++j)
+                    for (int i = from.x; i < to.x; ++i) {
+                        const float2 patch = texels[j * size.x + i];
+                        const float a0 = i * texel.x - 1.0f, a1 = (i + 1) * texel.x - 1.0f;
+                        const float b0 = 1.0f - (j + 1) * texel.y, b1 = 1.0f - j * texel.y;
+                        if (!reaches(patch.x, a0, a1, b0, b1, box, half_inverse_scale)) continue;
+                        add_patch(&mine, patch, a0, a1, b0, b1, scale);
+                        ++count;
+                    }
+            }
+    }
+
+    // Overlapping patches may sum to more than the whole light.
+    for (int row = 0; row < ITEM_ROWS; ++row) {
+        float seen[LANES];
+        store_lanes(1.0f - saturate(sum[row]), seen);
+        for (int lane = 0; lane < LANES; ++lane) {
+            if (x + lane >= receivers.width || y + row >= receivers.height) continue;
+            const int at = (y + row) * receivers.width + x + lane;
+            visibility[at] = merge ? fmin(visibility[at], seen[lane]) : seen[lane];
+        }
+    }
+    if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[tile] = merge ? evaluated[tile] + count : count;
+}
