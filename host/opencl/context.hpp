@@ -6,7 +6,10 @@
 #define CL_HPP_MINIMUM_OPENCL_VERSION 120
 #include <CL/opencl.hpp>
 
+#include <array>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include <penumbra/engine.hpp>
@@ -17,6 +20,7 @@
 namespace penumbra::opencl {
 
 class ProgramCache;
+class Ledger;
 
 class Context {
 public:
@@ -37,16 +41,25 @@ public:
     // added to `compile_ms`. A build failure is Error(device) with the build log's first error line.
     cl::Kernel kernel(const Specialisation& specialisation, const char* name, double& compile_ms) const;
 
+    // True the first time for a kernel's program, name and work-group shape: drivers finish compiling at that launch.
+    bool first_launch(const cl::Kernel& kernel, const std::string& name, const std::array<std::size_t, 2>& local) const;
+
+    // What lives on the device by this context's doing.
+    const std::shared_ptr<Ledger>& ledger() const { return ledger_; }
+
     // Tests turn this on: every buffer gets a guard tail, checked when the buffer is read or dropped.
     bool canaries = false;
 
 private:
-    Context(cl::Context context, cl::Device device);
+    Context(cl::Context context, cl::Device device, DeviceInfo info);
     cl::Context context_;
     cl::Device device_;
     DeviceInfo info_;
     Quirks quirks_;
     std::unique_ptr<ProgramCache> programs_;
+    std::shared_ptr<Ledger> ledger_;
+    mutable std::mutex launched_mutex_;
+    mutable std::set<std::string> launched_;
 };
 
 } // namespace penumbra::opencl

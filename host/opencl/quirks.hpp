@@ -14,6 +14,8 @@ struct Quirks {
     int lanes = 1;
     // Work-items beside each other in a tile of receivers: 1 x 1 with lanes, 16 x 16 without.
     int tile_group = 16;
+    // Whether built programs are kept on disk as binaries.
+    bool keep_binaries = true;
 };
 
 // Called before the first OpenCL call of the process: sets what PoCL reads from the environment, unless the user has set it

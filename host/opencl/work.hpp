@@ -2,27 +2,35 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "opencl/context.hpp"
 
 namespace penumbra::opencl {
 
-// Bytes on the device now and at most, of one piece of work and what it keeps.
+// Bytes on the device now and at most, of one piece of work and what it keeps. Atomic, because what it keeps may be dropped by another
+// thread.
 struct MemoryMeter {
-    std::uint64_t live = 0, peak = 0;
+    std::atomic<std::uint64_t> live = 0, peak = 0;
 };
 
 // `count` elements of T on the device; owns them, moves, does not copy.
 template <class T> class Buffer {
 public:
     Buffer() = default;
-    Buffer(cl::Buffer memory, std::size_t count, std::shared_ptr<void> guard) : memory_(std::move(memory)), count_(count), guard_(std::move(guard)) {}
+    Buffer(cl::Buffer memory, std::size_t count, std::shared_ptr<void> guard)
+        : memory_(std::move(memory)), count_(count), guard_(std::move(guard))
+    {
+    }
     const cl::Buffer& memory() const { return memory_; }
     std::size_t count() const { return count_; }
     std::uint64_t bytes() const { return static_cast<std::uint64_t>(count_) * sizeof(T); }
@@ -36,16 +44,19 @@ private:
 
 class Work {
 public:
-    explicit Work(std::shared_ptr<const Context> context);                         // on a queue of its own
-    Work(std::shared_ptr<const Context> context, cl_command_queue queue);          // on the caller's; nothing here then waits for the device
+    explicit Work(std::shared_ptr<const Context> context);                // on a queue of its own
+    Work(std::shared_ptr<const Context> context, cl_command_queue queue); // on the caller's; nothing here then waits for the device
 
     const Context& context() const { return *context_; }
     const cl::CommandQueue& queue() const { return queue_; }
 
-    // Room for `count` elements, not initialised. At least one element is allocated. Throws too_large with the numbers when over the device's largest allocation or its memory.
+    // Room for `count` elements, not initialised. At least one element is allocated. Throws too_large with the numbers when over the
+    // device's largest allocation or its memory.
     template <class T> Buffer<T> buffer(std::size_t count, const char* what)
     {
-        auto [memory, guard] = allocate(static_cast<std::uint64_t>(count) * sizeof(T), what);
+        // A count whose bytes do not fit 64 bits is over every limit.
+        constexpr std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
+        auto [memory, guard] = allocate(count > most / sizeof(T) ? most : static_cast<std::uint64_t>(count) * sizeof(T), what);
         return Buffer<T>(std::move(memory), count, std::move(guard));
     }
     template <class T> Buffer<T> upload(std::span<const T> data, const char* what)
@@ -61,11 +72,12 @@ public:
         return data;
     }
 
-    // Runs a kernel over `global` items (rounded up to `local`, so kernels guard their range). Arguments: Buffers, cl::Buffers, or plain values
-    // (float, int, cl_int2, structs shared with kernels). `bytes`: what it must move at the least, for the report.
-    template <class... Args>
-    void launch(const Specialisation& specialisation, const char* kernel, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
-                std::uint64_t bytes, const Args&... args)
+    // Runs a kernel over `global` items (rounded up to `local`, so kernels guard their range). Arguments: Buffers, cl::Buffers, or plain
+    // values (float, int, cl_int2, structs shared with kernels); an empty Buffer is a null pointer. `bytes`: what it must move at the
+    // least, for the report. Buffers must live until this returns; the driver holds them until the kernel is done. No items: no launch.
+    // Throws too_large, with the numbers, for a work-group over the limits of kernel or device.
+    template <class... Args> void launch(const Specialisation& specialisation, const char* kernel, std::array<std::size_t, 2> global,
+                                         std::array<std::size_t, 2> local, std::uint64_t bytes, const Args&... args)
     {
         cl::Kernel k = context_->kernel(specialisation, kernel, compile_ms_);
         cl_uint index = 0;
@@ -73,10 +85,11 @@ public:
         enqueue(k, kernel, global, local, bytes);
     }
 
-    // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name are
-    // joined. What a stage spends building programs is taken out of it and reported as the stage "compile".
+    // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name
+    // are joined. What a stage spends building programs is taken out of it and reported as the stage "compile".
     void stage(const char* name);
-    // Ends the last stage and returns all.
+    // Ends the last stage and returns all; the next stage starts afresh. On the caller's queue device_ms is 0 for stages that are still
+    // under way or not profiled. With canaries: Error(internal) when any buffer's guard tail was written to.
     std::vector<Stage> finish();
 
     MemoryMeter& memory() { return *memory_; }
@@ -87,7 +100,8 @@ private:
     std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes);
-    void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local, std::uint64_t bytes);
+    void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
+                 std::uint64_t bytes);
 
     template <class T> void set_argument(cl::Kernel& kernel, const char* name, cl_uint index, const Buffer<T>& buffer)
     {
@@ -98,16 +112,22 @@ private:
         set_argument_bytes(kernel, name, index, sizeof(cl_mem), &buffer());
     }
     template <class T>
-        requires std::is_trivially_copyable_v<T>
+    requires std::is_trivially_copyable_v<T>
     void set_argument(cl::Kernel& kernel, const char* name, cl_uint index, const T& value)
     {
         set_argument_bytes(kernel, name, index, sizeof(T), &value);
     }
     void set_argument_bytes(cl::Kernel& kernel, const char* name, cl_uint index, std::size_t bytes, const void* value);
 
+    cl::Event* new_event(); // of the running stage; null on a queue without profiling
+    void ensure_stage();    // work outside any stage counts as the stage "work"
+    void end_stage();
+    void add_device_times();
+    void check_canaries();
+
     std::shared_ptr<const Context> context_;
     cl::CommandQueue queue_;
-    bool own_queue_ = true;
+    bool own_queue_ = true, profiled_ = true;
     std::shared_ptr<MemoryMeter> memory_ = std::make_shared<MemoryMeter>();
     double compile_ms_ = 0, total_compile_ms_ = 0;
     std::vector<Stage> stages_;

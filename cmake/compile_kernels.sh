@@ -1,0 +1,55 @@
+#!/bin/sh
+# Compiles every specialisation of every kernel, as OpenCL C 1.2, warnings as errors, for two address models that differ from the host's.
+#
+#     compile_kernels.sh CLANG KERNELS_FOLDER LIST
+#
+# LIST is an executable that prints one specialisation a line: a file below KERNELS_FOLDER, then its -D options.
+# Exits 1, after trying all of them, when any fails; the failing command's line is shown.
+set -u
+clang=$1
+kernels=$2
+list=$3
+
+# spir64 stands for any device (generic OpenCL address spaces, no vector registers to lean on), amdgcn for a real GPU, the empty one for the
+# host, which is what PoCL compiles for. A clang without a back end leaves that one out.
+targets=
+for target in spir64 amdgcn-amd-amdhsa; do
+    if echo 'kernel void probe(global float* a) { a[get_global_id(0)] = 0.0f; }' |
+        "$clang" -x cl -cl-std=CL1.2 -target "$target" -nogpulib -Xclang -finclude-default-header -fsyntax-only - 2>/dev/null; then
+        targets="$targets $target"
+    fi
+done
+
+lines=$("$list") || { echo "compile_kernels: $list failed" >&2; exit 1; }
+[ -n "$lines" ] || { echo "compile_kernels: $list printed no specialisation" >&2; exit 1; }
+
+# One line, all targets. The options are split at blanks; a value that holds one cannot be written in a specialisation either.
+compile() {
+    file=$1
+    shift
+    if [ ! -f "$kernels/$file" ]; then
+        echo "compile_kernels: no kernel file $file below $kernels" >&2
+        return 1
+    fi
+    for target in host $targets; do
+        if [ "$target" = host ]; then machine=; else machine="-target $target -nogpulib"; fi
+        # shellcheck disable=SC2086
+        if ! "$clang" -x cl -cl-std=CL1.2 $machine -Xclang -finclude-default-header -Wall -Wextra -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
+            echo "compile_kernels: failed for $target: $file $*" >&2
+            return 1
+        fi
+    done
+}
+
+failures=0
+count=0
+while IFS= read -r line; do
+    [ -n "$line" ] || continue
+    count=$((count + 1))
+    # shellcheck disable=SC2086
+    compile $line || failures=$((failures + 1))
+done <<END
+$lines
+END
+
+[ "$failures" -eq 0 ] || { echo "compile_kernels: $failures of $count specialisations failed" >&2; exit 1; }
