@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,11 +17,16 @@ namespace penumbra {
 // Largest image that is read: width * height * channels samples.
 constexpr std::uint64_t max_image_samples = std::uint64_t{1} << 30;
 
-// A whole image (1, 3 or 4 channels; alpha kept). `where` starts every message.
-Image decode_image(std::span<const std::byte> bytes, std::string_view where);
+// A whole image (1 to 4 channels; alpha kept, not multiplied in). `where` starts every message.
+Image decode_image(std::span<const std::byte> bytes, std::string_view where, std::uint64_t max_samples = max_image_samples);
 
-// One depth channel. `channel` empty: Z, depth.Z, *.Depth.Z, OpenImageIO's own z channel, or the only channel; otherwise an error that lists the channels.
-RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where);
+// One depth channel, of the first part that has one. `channel` empty: Z, depth.Z, *.Depth.Z, OpenImageIO's own z channel, or the only
+// channel beside alpha; otherwise an error that lists the channels.
+RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where,
+                          std::uint64_t max_samples = max_image_samples);
+
+// An EXR with one float32 channel, Z.
+std::vector<std::byte> encode_depth(const DepthMap& depth);
 
 // Reads a file whole. Throws not_found or too_large.
 std::vector<std::byte> read_file(const std::string& path, std::string_view where);

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +20,8 @@ public:
     virtual std::vector<std::byte> bytes(const std::string& name) const = 0;
     // A path for readers that need files (meshes with companions); throws unsupported where there are no files.
     virtual std::string path(const std::string& name) const = 0;
+    // The largest image (width * height * channels) that is decoded; larger ones are refused by their header.
+    virtual std::uint64_t max_samples() const { return std::uint64_t{1} << 30; }
 };
 
 // Names relative to `folder`.
@@ -36,10 +38,12 @@ private:
 // Parses and loads. Every error names its key ("occluders.depth.front: ...").
 Scene parse_scene(std::string_view json, const Resources& resources);
 
-// A scene file's JSON for `scene`, with its depth images under the given names (empty: left out), cameras explicit. Objects are not written.
+// A scene file's JSON for `scene`, with its depth images under the given names (empty: left out), cameras explicit. Objects are not
+// written. Throws usage for a light's emission without a name, and for more layers than names or the other way round.
 struct DepthNames {
     std::string front, back, receiver;
     std::vector<std::string> layers;
+    std::string emission; // the light's, when it has one
 };
 std::string write_scene(const Scene& scene, const DepthNames& names);
 

@@ -1,0 +1,96 @@
+#include <cmath>
+#include <numbers>
+
+#include "io/mesh_io.hpp"
+#include "io/scene_parts.hpp"
+#include "scene/camera.hpp"
+
+namespace penumbra {
+
+namespace {
+
+// Counter-clockwise seen from the side that cross(half_u, half_v) points to.
+TriangleMesh read_quad(const JsonValue& value)
+{
+    const JsonObject section(value, {"center", "half_u", "half_v"});
+    const Vec3 center = section.need("center").vec3(), u = section.need("half_u").vec3(), v = section.need("half_v").vec3();
+    // Positions become float32: half-edges closer to parallel than its 24 bits can tell have no area for certain.
+    if (!(u.normalized().cross(v.normalized()).length() > 0x1p-20))
+        throw value.error("has no area: half_u and half_v are zero or parallel");
+
+    TriangleMesh mesh;
+    for (const Vec3& corner : {center - u - v, center + u - v, center + u + v, center - u + v}) mesh.positions.emplace_back(corner);
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return mesh;
+}
+
+TriangleMesh read_mesh_file(const JsonValue& name, const Resources& resources)
+{
+    const std::string file = name.text();
+    std::string path;
+    try {
+        path = resources.path(file);
+    } catch (const Error& error) {
+        throw error.within(name.key());
+    }
+    return read_mesh(path, name.key() + ": " + file);
+}
+
+TriangleMesh read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
+                                std::vector<std::string>& warnings)
+{
+    const JsonValue name = section.need("depth");
+    const JsonValue place = section.need("camera");
+    const CameraSpec spec = parse_camera(place, light);
+    const auto given = section.find("encoding");
+    const DepthMap map = load_depth(name, given ? parse_encoding(*given) : MapEncoding{}, spec, resources, warnings);
+    // There is nothing that a light's camera could be fitted to: this depth image is the object.
+    TriangleMesh mesh = mesh_from_depth(map, resolve_camera(spec, light, {}, map.width, map.height, place.key()));
+    if (mesh.triangles.empty()) warnings.push_back(name.key() + ": " + name.text() + " shows no surface");
+    return mesh;
+}
+
+// Scale, then rotations about X, Y and Z, then translation.
+void place(TriangleMesh& mesh, const JsonObject& section)
+{
+    const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
+    const double s = scale ? scale->positive() : 1;
+    const Vec3 r = rotate ? rotate->vec3() * (std::numbers::pi / 180) : Vec3(0, 0, 0);
+    const Vec3 t = translate ? translate->vec3() : Vec3(0, 0, 0);
+    const Vec3 c(std::cos(r.x), std::cos(r.y), std::cos(r.z)), n(std::sin(r.x), std::sin(r.y), std::sin(r.z));
+    for (Imath::V3f& position : mesh.positions) {
+        Vec3 p = Vec3(position) * s;
+        p = {p.x, c.x * p.y - n.x * p.z, n.x * p.y + c.x * p.z};
+        p = {c.y * p.x + n.y * p.z, p.y, c.y * p.z - n.y * p.x};
+        p = {c.z * p.x - n.z * p.y, n.z * p.x + c.z * p.y, p.z};
+        position = Imath::V3f(p + t);
+        if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
+            throw section.value().error("has positions beyond float32", "scale and translate are too large");
+    }
+}
+
+} // namespace
+
+Object parse_object(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)
+{
+    const JsonObject section(value);
+    const int kinds = section.has("mesh") + section.has("quad") + section.has("depth");
+    if (kinds != 1) throw value.error("has " + std::to_string(kinds) + " of mesh, quad and depth, expected exactly one");
+
+    Object object;
+    if (const auto casts = section.find("casts")) object.casts = casts->flag();
+    if (const auto receives = section.find("receives")) object.receives = receives->flag();
+    if (section.has("depth")) {
+        section.allow_only({"depth", "camera", "encoding", "scale", "rotate_deg", "translate", "casts", "receives"}, "of a depth object");
+        object.name = section.need("depth").text();
+        object.mesh = read_depth_surface(section, light, resources, warnings);
+    } else {
+        section.allow_only({"mesh", "quad", "scale", "rotate_deg", "translate", "casts", "receives"}, "of an object");
+        object.name = section.has("mesh") ? section.need("mesh").text() : "quad";
+        object.mesh = section.has("mesh") ? read_mesh_file(section.need("mesh"), resources) : read_quad(section.need("quad"));
+    }
+    place(object.mesh, section);
+    return object;
+}
+
+} // namespace penumbra
