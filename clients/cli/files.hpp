@@ -1,0 +1,43 @@
+// Checks of file arguments, made before any work is done.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include <penumbra/error.hpp>
+#include <penumbra/image.hpp>
+#include <penumbra/scene.hpp>
+
+namespace penumbra::cli {
+
+// The folder that `path` is to be written into is there, and `path` is no folder itself. Throws usage, starting with the flag.
+void require_place_for(const std::string& path, std::string_view flag);
+
+// Throws usage when both name one file.
+void require_different(const std::string& path, std::string_view flag, const std::string& other, std::string_view other_flag);
+
+// How to write an image to `path`: the format of its extension; the bits of `wanted` where that is for the same format. Throws usage.
+OutputFormat format_for(const std::string& path, const OutputFormat& wanted, std::string_view flag);
+
+// Makes the folder, and those that lead to it, unless it is there. Throws output.
+void make_folder(const std::string& path, std::string_view flag);
+
+// Whole or not at all.
+void write_text(const std::string& path, std::string_view text);
+
+// load_scene, the errors of which name the file.
+Scene read_scene(const std::string& path);
+
+// Runs `work`; errors about the input get the scene's path in front, unless it stands there already.
+template <class Work> auto in_scene(const std::string& path, const Work& work)
+{
+    try {
+        return work();
+    } catch (const Error& error) {
+        if (exit_code(error.code()) != 2 || error.message().starts_with(path)) throw;
+        throw error.within(path);
+    }
+}
+
+} // namespace penumbra::cli

@@ -1,0 +1,90 @@
+// penumbra mask: one scene, one mask.
+#include <memory>
+
+#include <penumbra/engine.hpp>
+#include <penumbra/error.hpp>
+#include <penumbra/image.hpp>
+#include <penumbra/scene.hpp>
+
+#include "files.hpp"
+#include "progress.hpp"
+#include "streams.hpp"
+#include "technique_flags.hpp"
+#include "verbs.hpp"
+
+namespace penumbra::cli {
+namespace {
+
+struct Flags {
+    std::string scene, mask, report, device;
+    TechniqueFlags technique;
+};
+
+constexpr const char* examples = R"(
+Examples:
+  penumbra mask scene.json -o mask.exr
+  penumbra mask scene.json -o mask.png --technique soft_shadow_map --set sides=both
+  penumbra mask scene.json -o mask.exr --report report.json --device 0
+
+Masks are visibility: 1 fully lit, 0 umbra, linear. Warnings go to standard error.)";
+
+void write_report(const Flags& flags, const Report& report)
+{
+    try {
+        write_text(flags.report, report_json(report));
+    } catch (const Error& error) {
+        throw Error(error.code(), flags.mask + " is written, but its report is not: " + error.message(), error.hint());
+    }
+}
+
+int run(const Flags& flags)
+{
+    // Refuse in order of cost: names, then the scene, then the device, then the work.
+    require_place_for(flags.mask, "-o");
+    require_different(flags.mask, "-o", flags.scene, "SCENE.json");
+    format_for(flags.mask, {}, "-o");
+    if (!flags.report.empty()) {
+        require_place_for(flags.report, "--report");
+        require_different(flags.report, "--report", flags.scene, "SCENE.json");
+        require_different(flags.report, "--report", flags.mask, "-o");
+    }
+
+    Progress progress;
+    progress.step("reading " + flags.scene);
+    Scene scene = read_scene(flags.scene);
+    const OutputFormat format = format_for(flags.mask, scene.output, "-o");
+    scene.technique = in_scene(flags.scene, [&] { return apply(scene.technique, flags.technique); });
+
+    progress.step("opening the device");
+    const Engine engine = open_engine(flags.device);
+
+    progress.step("computing the mask by " + scene.technique.kind + " on " + engine.device().name);
+    const Mask mask = in_scene(flags.scene, [&] { return engine.mask(scene); });
+
+    progress.step("writing " + flags.mask);
+    write_image(flags.mask, mask.visibility, format);
+    progress.end();
+    print_warnings(mask.report.warnings);
+    if (!flags.report.empty()) write_report(flags, mask.report);
+    return 0;
+}
+
+} // namespace
+
+Verb mask_verb(CLI::App& program)
+{
+    const auto flags = std::make_shared<Flags>();
+    CLI::App* app = add_verb(program, "mask", "Compute the mask of a scene.", "mask SCENE.json -o MASK [options]");
+    app->add_option("SCENE.json", flags->scene, "the scene")->option_text(" ")->required();
+    app->add_option("-o,--output", flags->mask,
+                    "the mask; its extension is the format: .exr .tif .png .pfm .hdr\n(bits as the scene's output says)")
+        ->option_text("MASK")
+        ->required();
+    add_technique_flags(*app, flags->technique);
+    app->add_option("--report", flags->report, "stages with milliseconds, bytes, device, warnings")->option_text("REPORT.json");
+    add_device_flag(*app, flags->device);
+    app->footer([] { return technique_help() + examples; });
+    return {app, [flags] { return run(*flags); }};
+}
+
+} // namespace penumbra::cli
