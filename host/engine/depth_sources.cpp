@@ -1,0 +1,128 @@
+#include "engine/depth_sources.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <penumbra/error.hpp>
+
+namespace penumbra {
+namespace {
+
+std::shared_ptr<const Tracer> tracer_of(const Scene& scene, bool Object::*role)
+{
+    std::vector<const TriangleMesh*> meshes;
+    for (const Object& object : scene.objects)
+        if (object.*role) meshes.push_back(&object.mesh);
+    return std::make_shared<const Tracer>(meshes, light_frame(scene.light).origin);
+}
+
+bool any(const Scene& scene, bool Object::*role)
+{
+    return std::any_of(scene.objects.begin(), scene.objects.end(), [role](const Object& object) { return object.*role; });
+}
+
+[[noreturn]] void missing(const char* key, const char* role, const std::string& hint = {})
+{
+    throw Error(ErrorCode::invalid_input, std::string(key) + ": is missing and there are no objects that " + role + " to render it from",
+                "expected a depth image or objects" + hint);
+}
+
+// How far a camera's place may be from the light's centre and still count as there: float32 rounding of either, with room for a chain of a
+// few operations. A shift by that much moves a back-projection by as much, far below a texel.
+double place_tolerance(const LightFrame& light, const Vec3& origin)
+{
+    const Vec3& a = light.origin;
+    const double size = std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z), std::abs(origin.x), std::abs(origin.y), std::abs(origin.z),
+                                  light.half_u, light.half_v});
+    return 0x1p-18 * size;
+}
+
+} // namespace
+
+DepthNeeds needs_of(const Technique& technique)
+{
+    if (const auto* settings = std::get_if<SoftShadowMap>(&technique))
+        return {.front = settings->sides != Sides::back, .back = settings->sides != Sides::front, .receivers = true};
+    return {.front = std::holds_alternative<ShadowMap>(technique), .back = false, .receivers = true};
+}
+
+Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height)
+{
+    const LightFrame frame = light_frame(light);
+    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera");
+    if (std::holds_alternative<LightCamera>(spec)) return camera;
+
+    // A pinhole will do if it is the light's own view: same place, same axes to within a ten-thousandth.
+    const double turned =
+        std::max({(camera.frame.x - frame.u).length(), (camera.frame.y - frame.v).length(), (camera.frame.z + frame.direction).length()});
+    if (frame.directional || (camera.frame.origin - frame.origin).length() > place_tolerance(frame, camera.frame.origin) || turned > 1e-4)
+        throw Error(ErrorCode::invalid_input, "occluders.camera: is not the light's own view",
+                    "expected kind \"light\", or a pinhole at the light's centre along its axes; depth from another camera can be given in "
+                    "objects");
+    return light_camera(frame, camera.half_extent, frame.origin);
+}
+
+std::shared_ptr<const Tracer> casters_of(const Scene& scene) { return tracer_of(scene, &Object::casts); }
+
+std::shared_ptr<const Tracer> receivers_of(const Scene& scene) { return tracer_of(scene, &Object::receives); }
+
+CameraSpec explicit_spec(const CameraSpec& spec, const Camera& camera)
+{
+    if (std::holds_alternative<PinholeCamera>(spec)) return PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent};
+    if (camera.orthographic) return LightCamera{.tan_half_fov = {}, .half_extent = camera.half_extent, .center = camera.frame.origin};
+    return LightCamera{.tan_half_fov = camera.half_extent, .half_extent = {}, .center = {}};
+}
+
+void check_size(const DepthMap& map, int width, int height, std::string_view where)
+{
+    const std::size_t count = static_cast<std::size_t>(std::max(width, 0)) * static_cast<std::size_t>(std::max(height, 0));
+    if (width < 1 || height < 1 || map.width != width || map.height != height || map.depth.size() != count)
+        throw Error(ErrorCode::invalid_input,
+                    std::string(where) + ": is " + std::to_string(map.width) + " x " + std::to_string(map.height) + " with " +
+                        std::to_string(map.depth.size()) + " depths",
+                    "expected " + std::to_string(width) + " x " + std::to_string(height));
+}
+
+Occluders occluders_with_depth(const Scene& scene, const DepthNeeds& needs)
+{
+    Occluders occluders = scene.occluders;
+    if (!needs.front && !needs.back) return occluders;
+
+    const bool render_front = needs.front && !occluders.front, render_back = needs.back && !occluders.back;
+    if (render_front && !any(scene, &Object::casts)) missing("occluders.depth.front", "cast");
+    if (render_back && !any(scene, &Object::casts)) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
+    const Camera camera = occluder_camera(scene.light, occluders.camera, scene.objects, occluders.width, occluders.height);
+    if (render_front || render_back) {
+        const auto tracer = casters_of(scene);
+        if (render_front) occluders.front = tracer->front(camera, occluders.width, occluders.height);
+        if (render_back) occluders.back = tracer->back(camera, occluders.width, occluders.height);
+    }
+    if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
+    if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");
+    occluders.camera = explicit_spec(LightCamera{}, camera);
+    return occluders;
+}
+
+Receivers receivers_with_depth(const Scene& scene)
+{
+    Receivers receivers = scene.receivers;
+    const Camera camera =
+        resolve_camera(receivers.camera, scene.light, scene.objects, receivers.width, receivers.height, "receivers.camera");
+    if (!receivers.depth) {
+        if (!any(scene, &Object::receives)) missing("receivers.depth", "receive");
+        receivers.depth = receivers_of(scene)->front(camera, receivers.width, receivers.height);
+    }
+    check_size(*receivers.depth, receivers.width, receivers.height, "receivers.depth");
+    receivers.camera = explicit_spec(receivers.camera, camera);
+    return receivers;
+}
+
+Scene with_depth(const Scene& scene, const Technique& technique)
+{
+    Scene result = scene;
+    result.occluders = occluders_with_depth(scene, needs_of(technique));
+    result.receivers = receivers_with_depth(scene);
+    return result;
+}
+
+} // namespace penumbra

@@ -1,0 +1,53 @@
+// What a Prepared holds, and what a report is made from.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <penumbra/engine.hpp>
+
+#include "opencl/work.hpp"
+#include "technique/ray_traced.hpp"
+#include "technique/shadow_map.hpp"
+#include "technique/soft_shadow_map.hpp"
+
+namespace penumbra {
+
+// Wall time since it was made.
+class Stopwatch {
+public:
+    double ms() const { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count(); }
+
+private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+struct Prepared::State {
+    std::shared_ptr<const opencl::Context> context;
+    Technique technique;
+    Light light;
+    Camera light_view;                             // of the occluder map; unused by rays
+    bool covered = false;                          // every caster is known to lie inside the occluder map
+    std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, for `project`; may be null
+    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap> data;
+
+    std::vector<Stage> stages;
+    double prepare_ms = 0;
+    std::shared_ptr<opencl::MemoryMeter> memory; // of what is kept on the device
+    std::uint64_t peak_bytes = 0;                // while preparing
+    std::vector<std::string> warnings;
+};
+
+// Throws unsupported when the technique does not take this light.
+void check_light(const Light& light, const Technique& technique);
+
+// The time of all stages but compiling and rendering depth.
+double work_ms(const std::vector<Stage>& stages);
+
+// Appends stages, joining those of the same name.
+void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more);
+
+} // namespace penumbra
