@@ -149,6 +149,7 @@ private:
 
     void compute(const BatchItem& item)
     {
+        require_not_named_in(item.scene, item.output, "--out");
         Scene scene = load_scene(item.scene);
         const OutputFormat format = format_for(item.output, scene.output, "--out");
         scene.technique = apply(scene.technique, flags_.technique);
@@ -185,7 +186,7 @@ private:
         write_text(manifest_, lines);
 
         if (failed > 0) print_error(std::to_string(failed) + " of " + std::to_string(items_.size()) + " scenes failed, see " + manifest_);
-        if (interrupt_signal != 0) {
+        if (interrupt_signal != 0 && finished_ < items_.size()) {
             print_error("interrupted after " + std::to_string(finished_) + " of " + std::to_string(items_.size()) +
                         " scenes (--resume goes on)");
             return 128 + static_cast<int>(interrupt_signal);

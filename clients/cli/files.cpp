@@ -3,6 +3,9 @@
 #include <filesystem>
 #include <span>
 #include <system_error>
+#include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "io/image_format.hpp"
 #include "io/image_io.hpp"
@@ -28,6 +31,27 @@ void require_different(const std::string& path, std::string_view flag, const std
     const bool same = fs::equivalent(path, other, ignored) || fs::weakly_canonical(path, error) == fs::weakly_canonical(other, error);
     if (same && !error)
         throw Error(ErrorCode::usage, std::string(flag) + " " + path + ": is the same file as " + std::string(other_flag) + " " + other);
+}
+
+void require_not_named_in(const std::string& scene, const std::string& path, std::string_view flag)
+{
+    std::error_code ignored;
+    const fs::path target = fs::weakly_canonical(path, ignored), folder = fs::path(scene).parent_path();
+    if (!fs::exists(target, ignored)) return;
+
+    nlohmann::json json;
+    try {
+        const std::vector<std::byte> bytes = read_file(scene, scene);
+        const auto* text = reinterpret_cast<const char*>(bytes.data());
+        json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+    } catch (const Error&) {
+        return;
+    }
+    if (json.is_discarded()) return;
+    for (const auto& [key, value] : json.flatten().items()) {
+        if (!value.is_string() || fs::weakly_canonical(folder / value.get<std::string>(), ignored) != target) continue;
+        throw Error(ErrorCode::usage, std::string(flag) + " " + path + ": would replace what " + scene + " is made from (" + key + ")");
+    }
 }
 
 OutputFormat format_for(const std::string& path, const OutputFormat& wanted, std::string_view flag)

@@ -17,6 +17,10 @@ void require_place_for(const std::string& path, std::string_view flag);
 // Throws usage when both name one file.
 void require_different(const std::string& path, std::string_view flag, const std::string& other, std::string_view other_flag);
 
+// No string in the scene file leads to `path`: results never replace what they are made from. Throws usage; a scene that cannot be read
+// passes, its own error comes later.
+void require_not_named_in(const std::string& scene, const std::string& path, std::string_view flag);
+
 // How to write an image to `path`: the format of its extension; the bits of `wanted` where that is for the same format. Throws usage.
 OutputFormat format_for(const std::string& path, const OutputFormat& wanted, std::string_view flag);
 

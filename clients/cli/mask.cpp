@@ -49,6 +49,8 @@ int run(const Flags& flags)
         require_different(flags.report, "--report", flags.mask, "-o");
     }
 
+    require_not_named_in(flags.scene, flags.mask, "-o");
+
     Progress progress;
     progress.step("reading " + flags.scene);
     Scene scene = read_scene(flags.scene);
