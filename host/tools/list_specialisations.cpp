@@ -1,0 +1,9 @@
+// Prints every specialisation of every kernel file, one a line, for the build's offline compile.
+#include <iostream>
+
+#include "technique/constants.hpp"
+
+int main()
+{
+    for (const auto& s : penumbra::every_specialisation()) std::cout << s.file << ' ' << s.options() << '\n';
+}
