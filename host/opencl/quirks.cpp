@@ -75,6 +75,8 @@ Quirks quirks_of(const cl::Device& device)
         quirks.lanes = 16;
         quirks.tile_group = 1;
     }
+    const std::string platform = cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()).getInfo<CL_PLATFORM_NAME>();
+    quirks.keep_binaries = platform.find("Portable Computing Language") == std::string::npos;
     return quirks;
 }
 

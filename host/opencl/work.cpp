@@ -136,10 +136,10 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes,
                      "use smaller maps, or a device with more memory");
     };
 
-    if (bytes > device.max_allocation_bytes || std::max(bytes, least) + tail > device.max_allocation_bytes) {
+    if (bytes > device.max_allocation_bytes || bytes + tail > device.max_allocation_bytes) {
         throw refuse("the largest allocation of " + device.name + " is " + bytes_text(device.max_allocation_bytes));
     }
-    const std::uint64_t whole = std::max(bytes, least) + tail;
+    const std::uint64_t whole = std::max(bytes + tail, least);
 
     // Some drivers (PoCL) hand out more than there is, and the process dies when it is touched.
     auto guard = std::make_shared<Guard>(context_->ledger(), memory_);
@@ -152,7 +152,7 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes,
     try {
         cl::Buffer memory(context_->context(), CL_MEM_READ_WRITE, whole);
         if (tail > 0) {
-            const GuardedBuffer guarded{memory, std::max(bytes, least), what};
+            const GuardedBuffer guarded{memory, bytes, what};
             plant_canary(queue_, guarded);
             context_->ledger()->watch(memory_.get(), guarded);
             guard->queue = queue_;

@@ -79,10 +79,16 @@ public:
     template <class... Args> void launch(const Specialisation& specialisation, const char* kernel, std::array<std::size_t, 2> global,
                                          std::array<std::size_t, 2> local, std::uint64_t bytes, const Args&... args)
     {
-        cl::Kernel k = context_->kernel(specialisation, kernel, compile_ms_);
+        ensure_stage();
+        launch(context_->kernel(specialisation, kernel, compile_ms_), kernel, global, local, bytes, args...);
+    }
+    // The same for a kernel object that nobody else uses.
+    template <class... Args> void launch(cl::Kernel kernel, const char* name, std::array<std::size_t, 2> global,
+                                         std::array<std::size_t, 2> local, std::uint64_t bytes, const Args&... args)
+    {
         cl_uint index = 0;
-        (set_argument(k, kernel, index++, args), ...);
-        enqueue(k, kernel, global, local, bytes);
+        (set_argument(kernel, name, index++, args), ...);
+        enqueue(kernel, name, global, local, bytes);
     }
 
     // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name
