@@ -48,7 +48,8 @@ void require_not_named_in(const std::string& scene, const std::string& path, std
         return;
     }
     if (json.is_discarded()) return;
-    for (const auto& [key, value] : json.flatten().items()) {
+    const nlohmann::json leaves = json.flatten();
+    for (const auto& [key, value] : leaves.items()) {
         if (!value.is_string() || fs::weakly_canonical(folder / value.get<std::string>(), ignored) != target) continue;
         throw Error(ErrorCode::usage, std::string(flag) + " " + path + ": would replace what " + scene + " is made from (" + key + ")");
     }

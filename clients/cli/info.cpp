@@ -145,7 +145,7 @@ std::string text_of(const DeviceInfo& device, bool selected)
 {
     std::ostringstream out;
     out << "  [" << device.index << "] " << device.name << (selected ? "  (selected)" : "") << "\n"
-        << "      " << device.type << ", " << device.vendor << ", platform " << device.platform << "\n"
+        << "      " << device.type << ", " << device.vendor << "\n      platform " << device.platform << "\n"
         << "      " << device.version << ", driver " << device.driver << "\n"
         << "      " << device.compute_units << " compute units, " << device.lanes << " receivers a work-item, work-groups of up to "
         << device.max_work_group << "\n"

@@ -26,8 +26,12 @@ constexpr const char* footer = "Exit codes: 0 done, 1 the work failed, 2 wrong u
 
 class VerbHelp : public CLI::Formatter {
 public:
-    explicit VerbHelp(std::string usage) : usage_(std::move(usage)) { column_width(34); }
-    std::string make_usage(const CLI::App*, std::string) const override { return "Usage: penumbra " + usage_ + "\n"; }
+    explicit VerbHelp(std::string usage) : usage_(std::move(usage))
+    {
+        column_width(34);
+        label("Positionals", "Arguments");
+    }
+    std::string make_usage(const CLI::App*, std::string) const override { return "\nUsage: penumbra " + usage_ + "\n"; }
 
 private:
     std::string usage_;
@@ -44,10 +48,10 @@ int run(int argc, char** argv)
 {
     CLI::App program(summary, "penumbra");
     program.formatter(std::make_shared<VerbHelp>("VERB ..."));
-    program.footer(footer);
     program.set_help_flag("-h,--help", "print this help");
     program.set_version_flag("--version", "penumbra " + version(), "print the version");
     const std::array verbs{mask_verb(program), depth_verb(program), compare_verb(program), batch_verb(program), info_verb(program)};
+    program.footer(footer); // after the verbs, which would inherit it
 
     std::string names;
     for (const Verb& verb : verbs) names += (names.empty() ? "" : ", ") + verb.app->get_name();

@@ -61,9 +61,9 @@ TEST_F(BatchCommand, FolderGivesTheMasksThatSingleRunsGive)
     EXPECT_EQ(statuses("masks/manifest.jsonl"), (Statuses{{"s0.json", "done"}, {"s1.json", "done"}, {"s2.json", "done"}}));
     for (const std::string name : {"s0", "s1", "s2"}) {
         EXPECT_EQ(penumbra({"mask", path("scenes/" + name + ".json"), "-o", path("one.pfm")}).code, 0);
-        EXPECT_EQ(text_of(path("one.pfm")), text_of(path("masks/" + name + ".pfm"))) << name;
+        expect_same_bytes(path("one.pfm"), path("masks/" + name + ".pfm"));
     }
-    EXPECT_NE(text_of(path("masks/s0.pfm")), text_of(path("masks/s2.pfm")));
+    EXPECT_TRUE(text_of(path("masks/s0.pfm")) != text_of(path("masks/s2.pfm")));
 }
 
 TEST_F(BatchCommand, ListWithCommentsRelativeToTheList)
@@ -175,7 +175,9 @@ TEST_F(BatchCommand, AnInterruptFinishesTheSceneAndWritesTheManifest)
             pending += status == "pending" ? 1 : 0;
             const std::string mask = path("masks/" + fs::path(scene).stem().string() + ".exr");
             EXPECT_EQ(fs::exists(mask), status == "done") << scene;
-            if (status == "done") EXPECT_EQ(read_image(mask).width, 40);
+            if (status == "done") {
+                EXPECT_EQ(read_image(mask).width, 40);
+            }
         }
         EXPECT_GE(done, 1);
         EXPECT_GE(pending, 1);

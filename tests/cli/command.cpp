@@ -112,6 +112,12 @@ std::string text_of(const std::string& path)
     return text.str();
 }
 
+void expect_same_bytes(const std::string& path, const std::string& other)
+{
+    const bool same = text_of(path) == text_of(other);
+    EXPECT_TRUE(same) << path << " and " << other << " differ";
+}
+
 void write_text(const std::string& path, const std::string& text)
 {
     std::ofstream out(path, std::ios::binary);

@@ -31,6 +31,7 @@ int wait_for(int process);
 inline const Environment no_device{{"OCL_ICD_VENDORS", "/nonexistent"}, {"OPENCL_VENDOR_PATH", "/nonexistent"}};
 
 std::string text_of(const std::string& path);
+void expect_same_bytes(const std::string& path, const std::string& other);
 void write_text(const std::string& path, const std::string& text);
 
 // A folder that is gone afterwards.
