@@ -49,20 +49,21 @@ __kernel void receiver_limits(const ReceiverView receivers, const OccluderView o
     limit[at] = own + rounding + (on_surface ? bias * slope : 0.0f);
 }
 
+// Adds u v to a sum. With binary32 the product is not rounded on its own.
 #if ACCUMULATOR == 0
-#define ACCUMULATE(sum, lost, share) (sum) += (share)
+#define ACCUMULATE(sum, lost, u, v) (sum) = fma(u, v, sum)
 #elif ACCUMULATOR == 1
 // Kahan: `lost` carries what rounding took from the sum so far.
-#define ACCUMULATE(sum, lost, share)                                                                                                               \
+#define ACCUMULATE(sum, lost, u, v)                                                                                                                \
     {                                                                                                                                              \
-        const floatn wanted = (share) - (lost);                                                                                                    \
+        const floatn wanted = fma(u, v, -(lost));                                                                                                  \
         const floatn next = (sum) + wanted;                                                                                                        \
         (lost) = (next - (sum)) - wanted;                                                                                                          \
         (sum) = next;                                                                                                                              \
     }
 #else
 // Blending into a 16-bit buffer: the fragment's value and the sum are both rounded to binary16.
-#define ACCUMULATE(sum, lost, share) (sum) = round_to_half((sum) + round_to_half(share))
+#define ACCUMULATE(sum, lost, u, v) (sum) = round_to_half((sum) + round_to_half((u) * (v)))
 #endif
 
 // Whether a block of texels from (a0, b0) to (a1, b1), none nearer to the light than `nearest`, can hide any of the light from any receiver
@@ -77,32 +78,31 @@ inline bool reaches(const float nearest, const float a0, const float a1, const f
     return a0 - wide_x <= box.s1 && a1 + wide_x >= box.s0 && b0 - wide_y <= box.s3 && b1 + wide_y >= box.s2;
 }
 
-// What a work-item knows of its tile and sums for its receivers.
+// A texel that can hide some of the light from the tile, and where its left edge lies.
 typedef struct {
-    __private floatn* sum;
-    __private floatn* lost;
-    __global const float* xi;
-    __global const float* eta;
-    __global const float* d;
-    __global const float* limit;
-    int first, stride; // of the work-item's receivers in the lists
-} Receivers;
+    float d, covered, a0;
+} Patch;
 
-// Adds one texel's share of the light for every receiver of the work-item (3.4 and 4.2: back-project, intersect, multiply).
+// Adds the shares of a row of patches for LANES receivers (3.4 and 4.2: back-project, intersect, multiply).
 //     u(a) = 1/2 + (a - xi) k / (d - d_p)      on a light scaled to [0, 1]
-inline void add_patch(Receivers* r, const float2 texel, const float a0, const float a1, const float b0, const float b1, const float2 scale)
+// The right edge is taken from the left one, u(a1) = u(a0) + h k / (d - d_p): that moves it by at most 2^-24 of the texel.
+inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const int count, const float b0, const float2 texel, const float2 scale,
+                        const floatn xi, const floatn eta, const floatn d, const floatn limit)
 {
-    for (int row = 0; row < ITEM_ROWS; ++row) {
-        const int at = r->first + row * r->stride;
-        const floatn xi = load_lanes(r->xi + at), eta = load_lanes(r->eta + at), own = load_lanes(r->d + at), limit = load_lanes(r->limit + at);
-
-        const floatn reach = 1.0f / (texel.x - own);
+    const floatn below = b0 - eta;
+    floatn total = *sum, rest = *lost;
+    for (int i = 0; i < count; ++i) {
+        const Patch patch = patches[i];
+        const floatn reach = 1.0f / (patch.d - d);
         const floatn du = scale.x * reach, dv = scale.y * reach;
-        const floatn u = saturate(fma(a1 - xi, du, (floatn)(0.5f))) - saturate(fma(a0 - xi, du, (floatn)(0.5f)));
-        const floatn v = saturate(fma(b1 - eta, dv, (floatn)(0.5f))) - saturate(fma(b0 - eta, dv, (floatn)(0.5f)));
-        const floatn share = select_lanes((floatn)(0.0f), u * v * texel.y, texel.x > limit);
-        ACCUMULATE(r->sum[row], r->lost[row], share);
+        const floatn u0 = fma(patch.a0 - xi, du, (floatn)(0.5f)), v0 = fma(below, dv, (floatn)(0.5f));
+        const floatn u = saturate(fma((floatn)(texel.x), du, u0)) - saturate(u0);
+        const floatn v = saturate(fma((floatn)(texel.y), dv, v0)) - saturate(v0);
+        const floatn counted = select_lanes((floatn)(0.0f), u, patch.d > limit);
+        ACCUMULATE(total, rest, counted, v * patch.covered);
     }
+    *sum = total;
+    *lost = rest;
 }
 
 // soft_shadow_map: the share of the light that each receiver sees past the micro-patches of one occluder map.
@@ -127,7 +127,6 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
 
     floatn sum[ITEM_ROWS], lost[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS; ++row) sum[row] = lost[row] = (floatn)(0.0f);
-    Receivers mine = {sum, lost, xi, eta, d, limit, y * receivers.stride + x, receivers.stride};
 
     const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
     const float2 half_inverse_scale = 0.5f / scale;
@@ -150,15 +149,27 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                 if (!reaches(blocks[by * block_count.x + bx], from.x * texel.x - 1.0f, to.x * texel.x - 1.0f, 1.0f - to.y * texel.y,
                              1.0f - from.y * texel.y, box, half_inverse_scale))
                     continue;
-                for (int j = from.y; j < to.y; ++j)
+                for (int j = from.y; j < to.y; ++j) {
+                    // The texels of this row that matter to the tile, then all of them for each row of receivers.
+                    const float b0 = 1.0f - (j + 1) * texel.y, b1 = 1.0f - j * texel.y;
+                    Patch patches[BLOCK];
+                    int found = 0;
                     for (int i = from.x; i < to.x; ++i) {
-                        const float2 patch = texels[j * size.x + i];
+                        const float2 t = texels[j * size.x + i];
                         const float a0 = i * texel.x - 1.0f, a1 = (i + 1) * texel.x - 1.0f;
-                        const float b0 = 1.0f - (j + 1) * texel.y, b1 = 1.0f - j * texel.y;
-                        if (!reaches(patch.x, a0, a1, b0, b1, box, half_inverse_scale)) continue;
-                        add_patch(&mine, patch, a0, a1, b0, b1, scale);
-                        ++count;
+                        if (!reaches(t.x, a0, a1, b0, b1, box, half_inverse_scale)) continue;
+                        patches[found].d = t.x;
+                        patches[found].covered = t.y;
+                        patches[found].a0 = a0;
+                        ++found;
                     }
+                    count += found;
+                    for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
+                        const int at = (y + row) * receivers.stride + x;
+                        add_patches(&sum[row], &lost[row], patches, found, b0, texel, scale, load_lanes(xi + at), load_lanes(eta + at),
+                                    load_lanes(d + at), load_lanes(limit + at));
+                    }
+                }
             }
     }
 

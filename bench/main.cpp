@@ -1,0 +1,64 @@
+// penumbra_bench BENCH...: runs benches and prints their rows as CSV. Without arguments it lists them.
+#include <cstdio>
+#include <cstring>
+
+#include <penumbra/penumbra.hpp>
+
+#include "cases.hpp"
+#include "rows.hpp"
+
+namespace {
+
+struct Case {
+    const char* name;
+    void (*run)(const penumbra::Engine&);
+    const char* meaning;
+};
+
+using namespace penumbra::bench;
+
+constexpr Case cases[] = {
+    {"bunny", bunny, "accuracy and time beside Embree's (4096-ray reference)"},
+    {"resolution", resolution, "error over the occluder map's resolution (Soft Shadow Maps, Fig. 17)"},
+    {"light_size", light_size, "error and time over the light's size (Figs. 18, 24)"},
+    {"lateral", lateral, "error as the occluder moves sideways (Fig. 19)"},
+    {"vertical", vertical, "error as the occluder moves towards the light (Fig. 20)"},
+    {"texels", texels, "time over the number of occluder texels (Fig. 22)"},
+    {"accumulators", accumulators, "binary16, binary32, compensated (Fig. 14, Appendix A)"},
+    {"baselines", baselines, "shadow maps: hard, percentage-closer, bicubic"},
+    {"large", large, "4096 x 4096 receivers, 2048 x 2048 occluders"},
+    {"limits", limits, "the device's limits, and what the inner loop reaches"},
+};
+
+int usage()
+{
+    std::fputs("usage: penumbra_bench BENCH...\n", stderr);
+    for (const Case& c : cases) std::fprintf(stderr, "  %-14s %s\n", c.name, c.meaning);
+    return 2;
+}
+
+} // namespace
+
+int main(int argc, char** argv)
+{
+    if (argc < 2) return usage();
+    try {
+        const penumbra::Engine engine;
+        std::printf("# penumbra %s, device %s (%s), %u compute units\n", penumbra::version().c_str(), engine.device().name.c_str(),
+                    engine.device().driver.c_str(), engine.device().compute_units);
+        print_header();
+        for (int i = 1; i < argc; ++i) {
+            bool known = false;
+            for (const Case& c : cases)
+                if (std::strcmp(c.name, argv[i]) == 0) {
+                    c.run(engine);
+                    known = true;
+                }
+            if (!known) return usage();
+        }
+    } catch (const penumbra::Error& error) {
+        std::fprintf(stderr, "penumbra_bench: %s\n", error.what());
+        return penumbra::exit_code(error.code());
+    }
+    return 0;
+}
