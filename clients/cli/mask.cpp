@@ -60,7 +60,7 @@ int run(const Flags& flags)
     progress.step("opening the device");
     const Engine engine = open_engine(flags.device);
 
-    progress.step("computing the mask by " + scene.technique.kind + " on " + engine.device().name);
+    progress.step("computing the mask by " + scene.technique.kind);
     const Mask mask = in_scene(flags.scene, [&] { return engine.mask(scene); });
 
     progress.step("writing " + flags.mask);

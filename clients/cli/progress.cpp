@@ -31,10 +31,14 @@ void Progress::step(std::string what)
 void Progress::watch(std::stop_token stop)
 {
     std::unique_lock lock(mutex_);
+    std::string drawn;
     while (!stop.stop_requested()) {
         changed_.wait_for(lock, stop, std::chrono::milliseconds(250), [] { return false; });
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - since_).count();
-        if (!stop.stop_requested() && seconds >= 1 && !what_.empty()) draw_line(what_ + ", " + std::to_string(seconds) + " s");
+        const std::string line = what_ + ", " + std::to_string(seconds) + " s";
+        if (stop.stop_requested() || seconds < 1 || what_.empty() || line == drawn) continue;
+        draw_line(line);
+        drawn = line;
     }
 }
 
