@@ -15,9 +15,8 @@ struct Quirks {
     // Work-items beside each other in a tile of receivers: 1 x 1 with lanes, 16 x 16 without.
     int tile_group = 16;
     // Whether built programs are kept on disk as binaries. Not with PoCL, which has a cache of its own. A process that builds 4 programs
-    // and launches their 13 kernels, from main() to the last launch, 2-core EPYC that compiles something else meanwhile, median of 4 (cold)
-    // and 8 (warm):
-    //     without  cold 3.3 s   warm 0.25 s  (idle machine: 2.4 s, 0.16 s)
+    // and launches their 13 kernels, from main() to the last launch, on a 2-core EPYC under a load of 4, median of 4 (cold) and 8 (warm):
+    //     without  cold 3.3 s   warm 0.25 s
     //     with     cold 5.7 s   warm 0.09 s
     // To give its binary, PoCL compiles every kernel once more. Cold: PENUMBRA_CACHE_DIR is empty; warm: the same process again.
     bool keep_binaries = true;
