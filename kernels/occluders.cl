@@ -81,17 +81,39 @@ __kernel void nearest_of_blocks(const int2 size, __global const float* restrict 
     nearest[y * blocks.x + x] = d;
 }
 
-// slope_steps: how much the surface's disparity changes from one texel to the next, across and down: the smaller of the two one-sided
-// differences, so that a silhouette does not count as a slope. 0 where neither neighbour is there.
-__kernel void slope_steps(const int2 size, __global const float2* restrict texels, __global float2* restrict steps)
+// Whether the step from a to b lies on one surface, as in scene/mesh_from_depth.cpp: a plane's disparity is linear across the image, so the
+// slope before or after must be of the same sign and at least half as steep (curvature may double a slope from one texel to the next).
+inline bool explains(const float slope, const float step, const float rounding)
+{
+    return step * slope > 0.0f && fabs(step) <= 2.0f * fabs(slope) + rounding;
+}
+
+// The size of the step from a to b when they are on one surface, else 0. Each disparity is off by up to `precision` of itself, so a difference
+// by twice that, and a doubled slope by twice that again.
+inline float joined_step(const float before, const float a, const float b, const float after, const float precision)
+{
+    const float step = b - a, rounding = 6.0f * precision * fmax(a, b);
+    const bool joined = a > 0.0f && b > 0.0f
+                        && (fabs(step) <= rounding || (before > 0.0f && explains(a - before, step, rounding)) || (after > 0.0f && explains(after - b, step, rounding)));
+    return joined ? fabs(step) : 0.0f;
+}
+
+// slope_steps: how much the surface's disparity changes from one texel to the next, across and down: the larger of the steps to the two
+// neighbours that are on the same surface. 0 where neither is.
+//
+//   precision  relative error of a disparity
+__kernel void slope_steps(const int2 size, const float precision, __global const float2* restrict texels, __global float2* restrict steps)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-    const int at = y * size.x + x;
-    const float d = texels[at].x;
-    const float left = x > 0 ? texels[at - 1].x : 0.0f, right = x + 1 < size.x ? texels[at + 1].x : 0.0f;
-    const float up = y > 0 ? texels[at - size.x].x : 0.0f, down = y + 1 < size.y ? texels[at + size.x].x : 0.0f;
-    const float across = fmin(left > 0.0f ? fabs(d - left) : NO_RECEIVER, right > 0.0f ? fabs(d - right) : NO_RECEIVER);
-    const float along = fmin(up > 0.0f ? fabs(d - up) : NO_RECEIVER, down > 0.0f ? fabs(d - down) : NO_RECEIVER);
-    steps[at] = d > 0.0f ? (float2)(across < NO_RECEIVER ? across : 0.0f, along < NO_RECEIVER ? along : 0.0f) : (float2)(0.0f);
+
+    float row[5], column[5];
+    for (int i = 0; i < 5; ++i) {
+        const int nx = x + i - 2, ny = y + i - 2;
+        row[i] = nx >= 0 && nx < size.x ? texels[y * size.x + nx].x : 0.0f;
+        column[i] = ny >= 0 && ny < size.y ? texels[ny * size.x + x].x : 0.0f;
+    }
+    steps[y * size.x + x] = (float2)(fmax(joined_step(row[0], row[1], row[2], row[3], precision), joined_step(row[1], row[2], row[3], row[4], precision)),
+                                     fmax(joined_step(column[0], column[1], column[2], column[3], precision),
+                                          joined_step(column[1], column[2], column[3], column[4], precision)));
 }

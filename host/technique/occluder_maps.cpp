@@ -37,7 +37,7 @@ OccluderView occluder_view(const OccluderDepth& depth, MapSize size)
             .light_scale_y = light_scale(depth.camera.half_extent.y, depth.light.half_v)};
 }
 
-OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction)
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision)
 {
     const std::size_t count = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
     const std::size_t source = static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height);
@@ -51,7 +51,7 @@ OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize fr
     else
         work.launch(program, reduction == Reduction::area ? "reduce_area" : "reduce_nearest", grid, {16, 8}, source * 4 + count * 8,
                     from_size, depth, to_size, map.texels);
-    work.launch(program, "slope_steps", grid, {16, 8}, count * 16, to_size, map.texels, map.steps);
+    work.launch(program, "slope_steps", grid, {16, 8}, count * 16, to_size, static_cast<float>(precision), map.texels, map.steps);
     return map;
 }
 

@@ -35,7 +35,7 @@ MapSize reduced_size(int width, int height, int resolution);
 // far inside the texel: 10^18 lights across at a disparity step of 1.
 OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
 
-// Disparity and covered share at `size`, and the surface's steps.
-OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction);
+// Disparity and covered share at `size`, and the surface's steps; depths are right to the relative `precision`.
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision);
 
 } // namespace penumbra

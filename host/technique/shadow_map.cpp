@@ -31,7 +31,7 @@ PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& de
     return {.settings = settings,
             .view = occluder_view(depth, size),
             .precision = depth.precision,
-            .map = occluder_map(work, depth.front, size, size, Reduction::area)};
+            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision)};
 }
 
 void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility)

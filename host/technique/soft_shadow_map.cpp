@@ -15,10 +15,11 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
 
-PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction)
+PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction,
+                                         double precision)
 {
     const MapSize blocks = blocks_of(size), superblocks = blocks_of(blocks);
-    PreparedSoftShadowMap::Side side{.map = occluder_map(work, depth, from, size, reduction),
+    PreparedSoftShadowMap::Side side{.map = occluder_map(work, depth, from, size, reduction, precision),
                                      .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
                                      .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
     const opencl::Specialisation program = OccludersConstants{}.specialisation();
@@ -91,8 +92,10 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
     const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
     PreparedSoftShadowMap prepared{
         .settings = settings, .view = occluder_view(depth, size), .precision = depth.precision, .nearest = 0, .sides = {}};
-    if (settings.sides != Sides::back) prepared.sides.push_back(prepare_side(work, depth.front, from, size, settings.reduction));
-    if (settings.sides != Sides::front) prepared.sides.push_back(prepare_side(work, depth.back, from, size, settings.reduction));
+    if (settings.sides != Sides::back)
+        prepared.sides.push_back(prepare_side(work, depth.front, from, size, settings.reduction, depth.precision));
+    if (settings.sides != Sides::front)
+        prepared.sides.push_back(prepare_side(work, depth.back, from, size, settings.reduction, depth.precision));
 
     for (const auto& side : prepared.sides)
         for (const float d : work.read(side.superblocks)) prepared.nearest = std::max(prepared.nearest, d);

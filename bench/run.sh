@@ -1,0 +1,18 @@
+#!/bin/sh
+# Runs benches, writes out/bench/NAME.csv and, when gnuplot is there, the plots of docs/pictures.
+#     bench/run.sh [BENCH...]     all of them without arguments: about half an hour on two cores
+# Needs a build: cmake --preset release && cmake --build --preset release
+set -eu
+cd "$(dirname "$0")/.."
+bench=${PENUMBRA_BENCH:-build/release/bench/penumbra_bench}
+[ -x "$bench" ] || { echo "bench/run.sh: $bench is missing: build first (./check builds it)" >&2; exit 2; }
+mkdir -p out/bench docs/pictures
+[ $# -gt 0 ] || set -- limits bunny baselines texels accumulators resolution light_size lateral vertical large
+for name in "$@"; do
+    echo "bench $name" >&2
+    "$bench" "$name" > "out/bench/$name.csv.part"
+    mv "out/bench/$name.csv.part" "out/bench/$name.csv"
+done
+if command -v gnuplot > /dev/null; then
+    gnuplot -e "csv='out/bench'; out='docs/pictures'" bench/plots.gp || echo "bench/run.sh: some plots lack their CSV" >&2
+fi
