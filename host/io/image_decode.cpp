@@ -14,6 +14,7 @@
 
 #include "io/image_format.hpp"
 #include "io/pfm.hpp"
+#include "io/png.hpp"
 
 namespace penumbra {
 
@@ -33,25 +34,12 @@ std::string one_line(std::string text)
     return text.substr(0, 200);
 }
 
-// Whether a PNG's chunks lead to its end: the decoder stops at the last sample and would not miss the rest.
-bool png_is_whole(std::span<const std::byte> bytes)
-{
-    std::size_t at = 8;
-    while (bytes.size() - at >= 12) {
-        const auto byte = [&](std::size_t i) { return std::to_integer<std::size_t>(bytes[at + i]); };
-        const std::size_t length = byte(0) << 24 | byte(1) << 16 | byte(2) << 8 | byte(3);
-        if (length > bytes.size() - at - 12) return false;
-        if (byte(4) == 'I' && byte(5) == 'E' && byte(6) == 'N' && byte(7) == 'D') return true;
-        at += 12 + length;
-    }
-    return false;
-}
-
 // An opened image. Closes before the bytes go.
 class Source {
 public:
     Source(std::span<const std::byte> bytes, ImageFormat format, std::string_view where)
-        : where_(where), memory_(bytes.data(), bytes.size()), format_(format)
+        : where_(where), chunks_(format == ImageFormat::png ? pixel_chunks(bytes, where) : std::vector<std::byte>()),
+          memory_(chunks_.empty() ? bytes.data() : chunks_.data(), chunks_.empty() ? bytes.size() : chunks_.size()), format_(format)
     {
         configure_openimageio();
         const std::string name = plugin(format);
@@ -59,7 +47,6 @@ public:
         if (!input_)
             throw Error(ErrorCode::internal,
                         std::string(where_) + " cannot be read: OpenImageIO lacks " + name + ": " + one_line(OIIO::geterror()));
-        if (format == ImageFormat::png && !png_is_whole(bytes)) throw broken(where_, "is truncated or broken: the PNG has no end");
 
         // Samples as they stand: no alpha multiplied in, no colour model turned into another.
         OIIO::ImageSpec wanted, found;
@@ -158,6 +145,7 @@ private:
     }
 
     std::string_view where_;
+    std::vector<std::byte> chunks_; // of a PNG
     OIIO::Filesystem::IOMemReader memory_;
     ImageFormat format_;
     std::unique_ptr<OIIO::ImageInput> input_;

@@ -11,12 +11,14 @@
 
 #include <assimp/BaseImporter.h>
 #include <assimp/Importer.hpp>
-#include <assimp/config.h>
 #include <assimp/importerdesc.h>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <penumbra/error.hpp>
+
+#include "io/image_io.hpp"
+#include "io/ply.hpp"
+#include "io/polygon.hpp"
 
 namespace penumbra {
 
@@ -31,10 +33,10 @@ struct Format {
     std::string_view extension, loader;
 };
 
-// Assimp's loaders by the names that they give themselves.
+// Assimp's loaders by the names that they give themselves; PLY is ours (ply.hpp).
 constexpr std::array<Format, 6> formats{{
     {".obj", "Wavefront Object Importer"},
-    {".ply", "Stanford Polygon Library (PLY) Importer"},
+    {".ply", ""},
     {".stl", "Stereolithography (STL) Importer"},
     {".3ds", "Discreet 3DS Importer"},
     {".gltf", "glTF2 Importer"},
@@ -101,43 +103,74 @@ private:
     std::unordered_map<Imath::V3f, std::uint32_t, Hash> known_;
 };
 
-// Appends one mesh under a transform. Triangles that collapse to a line or point when vertices are joined have no area and go.
-void append(const aiMesh& source, const aiMatrix4x4& world_from_mesh, std::string_view where, Welder& welder, TriangleMesh& mesh)
+// Appends polygons; those with fewer than three corners are points and lines and cast nothing. Triangles that collapse when vertices are
+// joined have no area and go.
+class Appender {
+public:
+    Appender(TriangleMesh& mesh, std::string_view where) : mesh_(mesh), where_(where), welder_(mesh) {}
+
+    void reserve(std::size_t vertices) { welder_.reserve(vertices); }
+
+    // The mesh's index of a vertex.
+    std::uint32_t vertex(const Imath::V3f& position)
+    {
+        if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
+            throw broken(where_, "has a vertex that is not finite");
+        return welder_.index(position);
+    }
+
+    void polygon(std::span<const std::uint32_t> corners, bool mirrored = false)
+    {
+        if (corners.size() < 3) return;
+        triangles_.clear();
+        triangulate(corners, mesh_.positions, triangles_);
+        for (auto& triangle : triangles_) {
+            if (mirrored) std::swap(triangle[1], triangle[2]);
+            if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) continue;
+            mesh_.triangles.push_back(triangle);
+        }
+        if (mesh_.triangles.size() > max_triangles)
+            throw Error(ErrorCode::too_large, std::string(where_) + " has over " + std::to_string(max_triangles) + " triangles");
+    }
+
+private:
+    TriangleMesh& mesh_;
+    std::string_view where_;
+    Welder welder_;
+    std::vector<std::array<std::uint32_t, 3>> triangles_;
+};
+
+void append(const aiMesh& source, const aiMatrix4x4& world_from_mesh, std::string_view where, Appender& out)
 {
     const bool mirrored = world_from_mesh.Determinant() < 0;
-    std::vector<std::uint32_t> indices(source.mNumVertices);
+    std::vector<std::uint32_t> indices(source.mNumVertices), corners;
     for (unsigned i = 0; i < source.mNumVertices; ++i) {
         const aiVector3D p = world_from_mesh * source.mVertices[i];
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) throw broken(where, "has a vertex that is not finite");
-        indices[i] = welder.index({p.x, p.y, p.z});
+        indices[i] = out.vertex({p.x, p.y, p.z});
     }
     for (unsigned f = 0; f < source.mNumFaces; ++f) {
         const aiFace& face = source.mFaces[f];
-        if (face.mNumIndices != 3) continue; // points and lines of meshes that mix them with triangles
-        for (unsigned k = 0; k < 3; ++k)
+        corners.clear();
+        for (unsigned k = 0; k < face.mNumIndices; ++k) {
             if (face.mIndices[k] >= source.mNumVertices)
-                throw broken(where, "has a triangle with vertex " + std::to_string(face.mIndices[k]) + " of " +
-                                        std::to_string(source.mNumVertices));
-        std::array<std::uint32_t, 3> triangle{indices[face.mIndices[0]], indices[face.mIndices[1]], indices[face.mIndices[2]]};
-        if (mirrored) std::swap(triangle[1], triangle[2]);
-        if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) continue;
-        mesh.triangles.push_back(triangle);
-        if (mesh.triangles.size() > max_triangles)
-            throw Error(ErrorCode::too_large, std::string(where) + " has over " + std::to_string(max_triangles) + " triangles");
+                throw broken(where,
+                             "has a face with vertex " + std::to_string(face.mIndices[k]) + " of " + std::to_string(source.mNumVertices));
+            corners.push_back(indices[face.mIndices[k]]);
+        }
+        out.polygon(corners, mirrored);
     }
 }
 
 void append_tree(const aiScene& scene, const aiNode& node, const aiMatrix4x4& world_from_parent, int depth, std::string_view where,
-                 Welder& welder, TriangleMesh& mesh)
+                 Appender& out)
 {
     if (depth > max_nodes_deep) throw broken(where, "has nodes nested deeper than " + std::to_string(max_nodes_deep));
     const aiMatrix4x4 world_from_node = world_from_parent * node.mTransformation;
     for (unsigned i = 0; i < node.mNumMeshes; ++i) {
         if (node.mMeshes[i] >= scene.mNumMeshes) throw broken(where, "has a node with a mesh that is not there");
-        append(*scene.mMeshes[node.mMeshes[i]], world_from_node, where, welder, mesh);
+        append(*scene.mMeshes[node.mMeshes[i]], world_from_node, where, out);
     }
-    for (unsigned i = 0; i < node.mNumChildren; ++i)
-        append_tree(scene, *node.mChildren[i], world_from_node, depth + 1, where, welder, mesh);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) append_tree(scene, *node.mChildren[i], world_from_node, depth + 1, where, out);
 }
 
 // Vertices that no triangle uses (points, lines, collapsed triangles) would count in bounds.
@@ -158,6 +191,36 @@ void drop_unused(TriangleMesh& mesh)
     mesh.positions = std::move(positions);
 }
 
+// No post-processing: its triangulation aborts the process on broken polygons.
+void read_by_assimp(const std::string& path, const Format& format, std::string_view where, Appender& out)
+{
+    Assimp::Importer importer;
+    keep_only(importer, format.loader);
+    const aiScene* scene = importer.ReadFile(path, 0);
+    if (!scene) throw broken(where, "cannot be read as a mesh: " + one_line(importer.GetErrorString()));
+    if (!scene->mRootNode) throw broken(where, "has no triangles");
+    std::size_t vertices = 0;
+    for (unsigned i = 0; i < scene->mNumMeshes; ++i) vertices += scene->mMeshes[i]->mNumVertices;
+    out.reserve(vertices);
+    append_tree(*scene, *scene->mRootNode, aiMatrix4x4(), 0, where, out);
+}
+
+void read_ply(const std::string& path, std::string_view where, Appender& out)
+{
+    const PolygonSoup soup = decode_ply(read_file(path, where), where);
+    out.reserve(soup.positions.size());
+    std::vector<std::uint32_t> indices, corners;
+    indices.reserve(soup.positions.size());
+    for (const Imath::V3f& position : soup.positions) indices.push_back(out.vertex(position));
+    std::size_t at = 0;
+    for (const std::uint32_t size : soup.sizes) {
+        corners.clear();
+        for (std::size_t k = 0; k < size; ++k) corners.push_back(indices[soup.corners[at + k]]);
+        at += size;
+        out.polygon(corners);
+    }
+}
+
 } // namespace
 
 TriangleMesh read_mesh(const std::string& path, std::string_view where)
@@ -169,19 +232,12 @@ TriangleMesh read_mesh(const std::string& path, std::string_view where)
     if (!std::filesystem::is_regular_file(path, error)) throw broken(where, "is not a file");
 
     TriangleMesh mesh;
+    Appender out(mesh, where);
     try {
-        Assimp::Importer importer;
-        keep_only(importer, format.loader);
-        importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-        const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType);
-        if (!scene || !scene->mRootNode || (scene->mFlags & AI_SCENE_FLAGS_INCOMPLETE && scene->mNumMeshes == 0))
-            throw broken(where, "cannot be read as a mesh: " + one_line(importer.GetErrorString()));
-
-        Welder welder(mesh);
-        std::size_t vertices = 0;
-        for (unsigned i = 0; i < scene->mNumMeshes; ++i) vertices += scene->mMeshes[i]->mNumVertices;
-        welder.reserve(vertices);
-        append_tree(*scene, *scene->mRootNode, aiMatrix4x4(), 0, where, welder, mesh);
+        if (format.loader.empty())
+            read_ply(path, where, out);
+        else
+            read_by_assimp(path, format, where, out);
     } catch (const Error&) {
         throw;
     } catch (const std::exception& failure) {

@@ -1,4 +1,4 @@
-// Meshes through Assimp: OBJ, PLY, STL, 3DS, glTF 2.
+// Meshes: OBJ, STL, 3DS and glTF 2 through Assimp, PLY by ourselves.
 #pragma once
 
 #include <string>

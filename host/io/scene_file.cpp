@@ -70,11 +70,7 @@ Scene parse_scene(std::string_view json, const Resources& resources)
     if (const auto output = root.find("output")) scene.output = parse_output(*output);
     if (const auto technique = root.find("technique")) {
         scene.technique = parse_technique(*technique);
-        try {
-            technique_from(scene.technique);
-        } catch (const Error& error) {
-            throw error.within(technique->key());
-        }
+        technique_from(scene.technique); // for its errors, which name the key
     }
     scene.light = parse_light(root.need("light"), resources);
     if (const auto occluders = root.find("occluders"))
