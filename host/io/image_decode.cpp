@@ -12,6 +12,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "io/exr_header.hpp"
 #include "io/image_format.hpp"
 #include "io/pfm.hpp"
 #include "io/png.hpp"
@@ -223,6 +224,7 @@ Image decode_image(std::span<const std::byte> bytes, std::string_view where, std
 {
     const ImageFormat format = format_from(bytes, where);
     if (format == ImageFormat::pfm) return decode_pfm(bytes, where, max_samples);
+    if (format == ImageFormat::exr) check_exr_header(bytes, where, max_samples);
     Source source(bytes, format, where);
     if (source.spec().nchannels > 4)
         throw broken(where,
@@ -246,6 +248,7 @@ RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view cha
                                                     : "is a colour PFM; depth needs one channel");
         return {image.width, image.height, SampleType::float32, std::move(image.pixels)};
     }
+    if (format == ImageFormat::exr) check_exr_header(bytes, where, max_samples);
     Source source(bytes, format, where);
     const Pick pick = pick_depth(source, channel, where);
     if (!source.seek(pick.part)) throw broken(where, "is truncated or broken");

@@ -87,7 +87,7 @@ TEST(Fuzz, Scenes)
                                          ",",
                                          "nan"};
     std::mt19937 random(20061);
-    for (int round = 0; round < 3000; ++round)
+    for (int round = 0; round < 8000; ++round)
         expect_error_or_success(round, [&] { parse_scene(mutated(scene, random, words), resources); });
 }
 
@@ -100,7 +100,7 @@ TEST(Fuzz, Images)
                                        OutputFormat{"png", 16}, OutputFormat{"png", 8}, OutputFormat{"pfm", 32}, OutputFormat{"hdr", 32}}) {
         SCOPED_TRACE(format.format + std::to_string(format.bits));
         const std::string whole = text_of(encode_image(ramp(9, 7, 3), format));
-        for (int round = 0; round < 300; ++round) {
+        for (int round = 0; round < 1500; ++round) {
             const std::vector<std::byte> bytes = bytes_of(mutated(whole, random, words));
             expect_error_or_success(round, [&] { decode_image(bytes, "x", 1 << 14); });
             expect_error_or_success(round, [&] { decode_raw_depth(bytes, "", "x", 1 << 14); });

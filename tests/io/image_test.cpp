@@ -198,6 +198,22 @@ TEST(Image, TooLargeIsRefusedByItsHeader)
     EXPECT_EQ(error_of([] { decode_image(bytes_of("PF\n2147483647 2147483647\n-1\n"), "x"); }).code(), ErrorCode::too_large);
 }
 
+TEST(Image, ExrHeadersThatClaimTheSkyAreRefused)
+{
+    const std::vector<std::byte> whole = encode_image(ramp(4, 4, 1), {"exr", 32});
+    const std::string_view text(reinterpret_cast<const char*>(whole.data()), whole.size());
+    const std::size_t window = text.find(std::string_view("dataWindow\0box2i\0", 17)) + 17 + 4;
+    // Right and bottom, little-endian: one row of 2^28 pixels, a column of them, 2^31 either way.
+    for (const std::string_view corner :
+         {std::string_view("\xff\xff\xff\x0f\0\0\0\0", 8), std::string_view("\0\0\0\0\xff\xff\xff\x0f", 8),
+          std::string_view("\xff\xff\xff\x7f\xff\xff\xff\x7f", 8), std::string_view("\xff\xff\xff\xff\0\0\0\0", 8)}) {
+        std::vector<std::byte> bytes = whole;
+        std::memcpy(&bytes[window + 8], corner.data(), 8);
+        const ErrorCode code = error_of([&] { decode_image(bytes, "x"); }).code();
+        EXPECT_TRUE(code == ErrorCode::invalid_input || code == ErrorCode::too_large);
+    }
+}
+
 TEST(Pfm, StandsBottomUpInEitherByteOrder)
 {
     const std::string header = "Pf\n1 2\n";
