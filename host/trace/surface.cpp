@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 
 #include <penumbra/error.hpp>
@@ -27,11 +28,6 @@ bool beside(const Surface& s, const Vec3& p, double margin)
     }
     return true;
 }
-
-struct PointQuery {
-    RTCPointQuery embree{};
-    NearSurfaces* found = nullptr;
-};
 
 bool note_triangle(RTCPointQueryFunctionArguments* arguments)
 {
@@ -123,7 +119,7 @@ Vec3 before_surfaces(const Tracer::Impl& scene, const Vec3& point, const Vec3& v
 
     // Clear one after the other, those that face the camera most first. At a silhouette the far side, turned to the camera, opposes the
     // near side: it is left out. Two planes at an angle of 60 degrees or more undo at most half of each other's move a pass: four passes
-    // leave a sixteenth, less than the slack in `clearance`.
+    // leave a small part, less than the slack in `clearance`.
     Vec3 p = point;
     const Vec3* const first = scratch.surfaces.empty() ? nullptr : &scratch.surfaces.front().normal;
     for (int pass = 0; pass < 4; ++pass)

@@ -28,8 +28,8 @@ public:
     // Depth of what the camera sees through each pixel's centre.
     DepthMap front(const Camera& camera, int width, int height) const; // nearest surface
     DepthMap back(const Camera& camera, int width, int height) const;  // furthest back-facing surface (normal along the ray)
-    // Surfaces 0, 1, ... `count` - 1 along each ray in order of depth (0 is `front`). The same hit reported by two triangles that share an edge
-    // counts once.
+    // Surfaces 0, 1, ... `count` - 1 along each ray in order of depth (0 is `front`). The same hit reported by two triangles that share an
+    // edge counts once.
     std::vector<DepthMap> layers(const Camera& camera, int width, int height, int count) const;
 
     struct Impl;
@@ -40,20 +40,23 @@ private:
 };
 
 struct VisibilityOptions {
-    int samples = 256;
+    int samples = 256; // rays a receiver, one in each stratum; a light without extent needs and gets one
+    // First `first_samples` rays everywhere, then all `samples` but for tiles of 4 x 4 pixels whose first rays, and those of the tiles next
+    // to them, were all free or all blocked.
     bool adaptive = false;
     int first_samples = 16;
     std::uint64_t seed = 1;
 };
 
 struct VisibilityResult {
-    Image visibility;          // 1 channel, or 3 for a textured light
-    std::uint64_t rays = 0;    // shadow rays cast
+    Image visibility;       // 1 channel, or 3 for a textured light
+    std::uint64_t rays = 0; // shadow rays cast
 };
 
-// Ray-traced visibility of the light at each pixel of a receiver depth map. Deterministic for a seed, whatever the thread count.
+// Ray-traced visibility of the light at each pixel of a receiver depth map; 1 where nothing is there or behind the light's plane.
+// Deterministic for a seed, whatever the thread count. A receiver that lies on one of the tracer's triangles is on the camera's side of it
+// (surface.hpp). A textured light shines evenly within each texel. Throws usage for sample counts below 1 and maps whose size does not fit.
 VisibilityResult trace_visibility(const Tracer& tracer, const Light& light, const DepthMap& receivers, const Camera& camera,
                                   const VisibilityOptions& options);
-
 
 } // namespace penumbra

@@ -220,6 +220,8 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
         rays.id[i] = 0;
         rays.flags[i] = 0;
     }
+    // Without Embree's coherent flag: on the bunny that took 1.0 (1024 samples) to 1.8 times (16) as long, packets of 8 and streams longer
+    // still.
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;

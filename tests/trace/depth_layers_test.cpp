@@ -119,16 +119,23 @@ TEST(DepthLayers, NothingBehindTheCamera)
 
 TEST(DepthLayers, FarCameraKeepsItsDigits)
 {
-    // A telescope a million units away: rays of a float32 origin would be off by 0.06, half of the box.
-    const double distance = 1e6;
-    const Camera camera = camera_at({0.3, 0.1, distance}, {0.3, 0.1, 0}, 0.2 / distance);
-    const Tracer tracer = tracer_of({box({0, 0, -0.1}, {0.6, 0.2, 0})});
+    // A telescope a million units away: rays from a float32 origin would be off by up to 0.06 sideways, a third of the quad.
+    const Vec3 eye(600000.3, 500000.1, 624499.7);
+    const Camera camera = camera_at(eye, {0, 0, 0}, 0.3e-6);
+    const Tracer tracer = tracer_of({quad({0, 0, 0}, {0.2, 0, 0}, {0, 0.1, 0})});
     const DepthMap map = tracer.front(camera, 40, 40);
+    int hits = 0;
     for (int y = 0; y < 40; ++y)
         for (int x = 0; x < 40; ++x) {
-            const Vec3 p = world_point(camera, 40, 40, x + 0.5, y + 0.5, distance);
-            EXPECT_EQ(map.at(x, y), p.x > 0 && p.x < 0.6 && p.y > 0 && p.y < 0.2 ? static_cast<float>(distance) : nothing_there) << p;
+            const Vec3 ray = world_point(camera, 40, 40, x + 0.5, y + 0.5, 1e6) - eye;
+            const double t = -eye.z / ray.z;
+            const Vec3 p = eye + ray * t;
+            const bool hit = std::abs(p.x) < 0.2 && std::abs(p.y) < 0.1;
+            hits += hit;
+            // The direction's float32 is off by 2^-24 over the two units that are left: nobody is that near to an edge.
+            EXPECT_EQ(map.at(x, y), hit ? static_cast<float>(1e6 * t) : nothing_there) << p;
         }
+    EXPECT_GT(hits, 50);
 }
 
 TEST(DepthLayers, ClosedMeshHasAnEvenNumber)

@@ -85,6 +85,19 @@ TEST(Adaptive, EqualsPlainOrIsSettled)
     EXPECT_EQ(adaptive.visibility.at(25, 35), 0.f);
 }
 
+TEST(Adaptive, TilesBesideADifferentTileAreNotSettled)
+{
+    // A shadow edge between two columns of tiles, its penumbra far narrower than a pixel: no tile is mixed. The two at the edge cast all
+    // rays.
+    const Light light = rectangle_light(1e-3, 1e-3);
+    const Tracer tracer = tracer_of({parallel_quad(0, 100, -100, 100, 2)});
+    const VisibilityResult result =
+        trace_visibility(tracer, light, flat_map(16, 8, 5), camera_of(light, 0.5), {.samples = 256, .adaptive = true, .first_samples = 9});
+    EXPECT_EQ(result.rays, 16u * 8u * 9u + 8u * 8u * 256u);
+    for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 16; ++x) EXPECT_EQ(result.visibility.at(x, y), x < 8 ? 1.f : 0.f);
+}
+
 TEST(Adaptive, FewSamplesArePlain)
 {
     const Case scene;

@@ -152,12 +152,42 @@ TEST(SelfShadow, FinelyTiledFloorBesideACoarseOne)
         for (int j = -10; j < 10; ++j) meshes.push_back(quad({i * 0.02 + 0.01, 0, j * 0.02 + 0.01}, {0.01, 0, 0}, {0, 0, -0.01}));
     const Light light = SphereLight{.center = {1, 1, 1}, .radius = 0.3, .direction = {-1, -1, -1}, .up = {}};
     const Tracer tracer = tracer_of(meshes, {1, 1, 1});
-    const Camera camera = camera_at({0.01, 0.3, 0.02}, {0.01, 0, 0}, 0.3);
-    const DepthMap depth = tracer.front(camera, 93, 93);
-    const Image mask = trace_visibility(tracer, light, depth, camera, {.samples = 16}).visibility;
-    for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
-        ASSERT_NE(depth.depth[i], nothing_there) << i;
-        ASSERT_EQ(mask.pixels[i], 1.f) << i;
+    // The middle column lies just beside the coarse floor's edge, by less and more than its rounding.
+    for (const double x : {0., 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4}) {
+        const Camera camera = camera_at({x, 0.3, 0.02}, {x, 0, 0}, 0.3);
+        const DepthMap depth = tracer.front(camera, 93, 93);
+        const Image mask = trace_visibility(tracer, light, depth, camera, {.samples = 16}).visibility;
+        for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
+            ASSERT_NE(depth.depth[i], nothing_there) << i;
+            ASSERT_EQ(mask.pixels[i], 1.f) << i << ", edge at " << x;
+        }
+    }
+}
+
+TEST(SelfShadow, DepthFromElsewhere)
+{
+    // The same quad, its depth in double from the plane itself or from a tracer with another origin: corners round differently each time.
+    const Placement at{1, {500, -300, 40}, true};
+    const Vec3 along(0.8, 0.6, 0), normal(-0.6, 0.8, 0);
+    const TriangleMesh mesh = placed(quad({0, 0, 0}, along * 4, {0, 0, -4}), at);
+    const Vec3 light_center = placed(normal * 2, at);
+    const Light light = SphereLight{.center = light_center, .radius = 0.3, .direction = -normal, .up = {}};
+    const Tracer tracer = tracer_of({mesh}, light_center), elsewhere = tracer_of({mesh}, {-70, 20, 10});
+    for (const double height : {4., 1., 0.1}) {
+        const Camera camera = camera_at(placed(normal * height + Vec3(0, 0, 3), at), placed(Vec3(0, 0, 0), at), 0.4);
+        DepthMap exact = elsewhere.front(camera, 61, 61);
+        int far = 0;
+        for (int y = 0; y < 61; ++y)
+            for (int x = 0; x < 61; ++x) {
+                const Vec3 ray = world_point(camera, 61, 61, x + 0.5, y + 0.5, 1) - camera.frame.origin;
+                const double depth = normal.dot(placed(Vec3(0, 0, 0), at) - camera.frame.origin) / normal.dot(ray);
+                if (exact.at(x, y) != nothing_there) exact.at(x, y) = static_cast<float>(depth), ++far;
+            }
+        EXPECT_GT(far, 500);
+        for (const DepthMap& depth : {exact, elsewhere.front(camera, 61, 61)}) {
+            const Image mask = trace_visibility(tracer, light, depth, camera, {.samples = 16}).visibility;
+            for (const float v : mask.pixels) ASSERT_EQ(v, 1.f) << "height " << height;
+        }
     }
 }
 
