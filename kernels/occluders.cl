@@ -3,8 +3,8 @@
 
 inline float disparity_of(const float depth)
 {
-    // Positive and finite, tested on the bits: anything else is nothing there.
-    return as_int(depth) > 0 && as_int(depth) < 0x7f800000 ? 1.0f / depth : 0.0f;
+    // Positive and finite, tested on the bits: anything else is nothing there. One over the smallest depths is beyond binary32: held finite.
+    return as_int(depth) > 0 && as_int(depth) < 0x7f800000 ? fmin(1.0f / depth, MAXFLOAT) : 0.0f;
 }
 
 // disparity_from_depth: a map as it is.

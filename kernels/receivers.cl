@@ -1,6 +1,10 @@
 // Receivers as light-space points (xi, eta, d), whichever camera saw them, and what tiles of them hold.
 #include "common/shared.h"
 
+#if TILE_WIDTH != 16
+#error "tile_bounds holds a row of a tile in a float16"
+#endif
+
 // receivers_from_depth: one light-space point a pixel (algorithms.md, "Light space").
 //
 //   depth  [height][width]   planar depth from the receivers' camera, scene units; not finite or not positive: nothing there
@@ -33,7 +37,24 @@ __kernel void receivers_from_depth(const ReceiverView view, __global const float
     const int at = y * view.stride + x;
     xi[at] = before ? lx / scale_x : 0.0f;
     eta[at] = before ? ly / scale_y : 0.0f;
-    d[at] = before ? 1.0f / lz : NO_RECEIVER;
+    // One over the smallest depths is beyond binary32: nearer to the light than anything, so nobody.
+    d[at] = before ? fmin(1.0f / lz, NO_RECEIVER) : NO_RECEIVER;
+}
+
+inline float least(const float16 v)
+{
+    const float8 a = fmin(v.lo, v.hi);
+    const float4 b = fmin(a.lo, a.hi);
+    const float2 c = fmin(b.lo, b.hi);
+    return fmin(c.x, c.y);
+}
+
+inline float total(const float16 v)
+{
+    const float8 a = v.lo + v.hi;
+    const float4 b = a.lo + a.hi;
+    const float2 c = b.lo + b.hi;
+    return c.x + c.y;
 }
 
 // tile_bounds: the box of light-space points that a tile of TILE_WIDTH x TILE_ROWS receivers holds.
@@ -51,24 +72,30 @@ __kernel void tile_bounds(const ReceiverView view, const float nearest, const fl
     const int tiles_x = view.stride / TILE_WIDTH;
     if (tile_x >= tiles_x || tile_y >= view.rows / TILE_ROWS) return;
 
-    float8 box = (float8)(NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, 0.0f, 0.0f, 0.0f);
-    for (int row = 0; row < TILE_ROWS; ++row)
-        for (int column = 0; column < TILE_WIDTH; ++column) {
-            const int at = (tile_y * TILE_ROWS + row) * view.stride + tile_x * TILE_WIDTH + column;
-            if (d[at] == NO_RECEIVER) continue;
-            box.s0 = fmin(box.s0, xi[at]);
-            box.s1 = fmax(box.s1, xi[at]);
-            box.s2 = fmin(box.s2, eta[at]);
-            box.s3 = fmax(box.s3, eta[at]);
-            box.s4 = fmin(box.s4, d[at]);
-            box.s5 = fmax(box.s5, d[at]);
-            box.s6 += 1.0f;
+    // Column by column in vectors of a whole tile row, then across. What is not there counts as beyond the other end. Comparisons, not fmin
+    // and fmax: those must treat NaN and take three instructions each.
+    const float16 most = (float16)(NO_RECEIVER), one = (float16)(1.0f);
+    float16 xi_low = most, xi_high = -most, eta_low = most, eta_high = -most, d_low = most, d_high = (float16)(0.0f);
+    float16 there = (float16)(0.0f), uncovered = (float16)(0.0f);
+    for (int row = 0; row < TILE_ROWS; ++row) {
+        const int at = (tile_y * TILE_ROWS + row) * view.stride + tile_x * TILE_WIDTH;
+        const float16 a = vload16(0, xi + at), b = vload16(0, eta + at), z = vload16(0, d + at);
+        const int16 present = z != most;
+        xi_low = select(xi_low, a, present & (a < xi_low));
+        xi_high = select(xi_high, a, present & (a > xi_high));
+        eta_low = select(eta_low, b, present & (b < eta_low));
+        eta_high = select(eta_high, b, present & (b > eta_high));
+        d_low = select(d_low, z, z < d_low);
+        d_high = select(d_high, z, present & (z > d_high));
+        there += select((float16)(0.0f), one, present);
 
-            // The light as seen from here covers the map's plane at `nearest` to this far from the receiver.
-            const float rise = fmax(nearest - d[at], 0.0f);
-            box.s7 += nearest > d[at] && (fabs(xi[at]) + rise * half_inverse_scale.x > 1.0f || fabs(eta[at]) + rise * half_inverse_scale.y > 1.0f) ? 1.0f : 0.0f;
-        }
-    bounds[tile_y * tiles_x + tile_x] = box;
+        // The light as seen from here covers the map's plane at `nearest` to this far from the receiver.
+        const float16 rise = nearest - z;
+        const int16 outside = (fabs(a) + rise * half_inverse_scale.x > one) | (fabs(b) + rise * half_inverse_scale.y > one);
+        uncovered += select((float16)(0.0f), one, present & (rise > (float16)(0.0f)) & outside);
+    }
+    bounds[tile_y * tiles_x + tile_x] =
+        (float8)(least(xi_low), -least(-xi_high), least(eta_low), -least(-eta_high), least(d_low), -least(-d_high), total(there), total(uncovered));
 }
 
 // sample_mask: a light-space mask seen from the receivers (Soft Shadow Maps, 3.1: "projected onto the scene").
