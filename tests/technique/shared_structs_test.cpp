@@ -1,0 +1,88 @@
+// Structs that kernels and host share are laid out alike on both.
+#include <cstddef>
+
+#include "support/device_run.hpp"
+#include "support/maps.hpp"
+
+#include "common/shared.h"
+#include "opencl/kernel_files.hpp"
+#include "opencl/program_cache.hpp"
+
+namespace penumbra::test {
+namespace {
+
+// The values that a kernel with this body writes to `out`.
+std::vector<cl_int> on_device(const std::string& body, std::size_t count)
+{
+    const std::string text = std::string(opencl::kernel_file("common/shared.h")) + R"(
+#define OFFSET(type, member) ((int)((__private char*)&value.member - (__private char*)&value))
+__kernel void layout(__global int* out) {
+)" + body + "}\n";
+    const auto context = device_context();
+    opencl::ProgramCache programs(context->context(), context->device(), "");
+    double compile_ms = 0;
+    opencl::Work work(context);
+    const auto out = work.buffer<cl_int>(count, "layout");
+    work.launch(cl::Kernel(programs.program("layout", text, compile_ms), "layout"), "layout", {1, 1}, {1, 1}, 0, out);
+    return work.read(out);
+}
+
+std::string writes(const std::string& type, const std::vector<std::string>& members)
+{
+    std::string body = "    " + type + " value;\n    out[0] = (int)sizeof(" + type + ");\n";
+    for (std::size_t i = 0; i < members.size(); ++i)
+        body += "    out[" + std::to_string(i + 1) + "] = OFFSET(" + type + ", " + members[i] + ");\n";
+    return body;
+}
+
+#define HERE(type, member) static_cast<cl_int>(offsetof(type, member))
+
+TEST(SharedStructs, ReceiverView)
+{
+    const std::vector<std::string> members = {"light_from_camera",
+                                              "camera_extent_x",
+                                              "camera_extent_y",
+                                              "light_extent_x",
+                                              "light_extent_y",
+                                              "camera_orthographic",
+                                              "light_orthographic",
+                                              "width",
+                                              "height",
+                                              "stride",
+                                              "rows"};
+    const std::vector<cl_int> host = {sizeof(ReceiverView),
+                                      HERE(ReceiverView, light_from_camera),
+                                      HERE(ReceiverView, camera_extent_x),
+                                      HERE(ReceiverView, camera_extent_y),
+                                      HERE(ReceiverView, light_extent_x),
+                                      HERE(ReceiverView, light_extent_y),
+                                      HERE(ReceiverView, camera_orthographic),
+                                      HERE(ReceiverView, light_orthographic),
+                                      HERE(ReceiverView, width),
+                                      HERE(ReceiverView, height),
+                                      HERE(ReceiverView, stride),
+                                      HERE(ReceiverView, rows)};
+    EXPECT_EQ(on_device(writes("ReceiverView", members), host.size()), host);
+    // Every member is listed: 12 + 4 floats and 6 ints.
+    EXPECT_EQ(sizeof(ReceiverView), 22 * 4u);
+}
+
+TEST(SharedStructs, OccluderView)
+{
+    const std::vector<std::string> members = {"width", "height", "texel_x", "texel_y", "light_scale_x", "light_scale_y"};
+    const std::vector<cl_int> host = {
+        sizeof(OccluderView),        HERE(OccluderView, width),         HERE(OccluderView, height),       HERE(OccluderView, texel_x),
+        HERE(OccluderView, texel_y), HERE(OccluderView, light_scale_x), HERE(OccluderView, light_scale_y)};
+    EXPECT_EQ(on_device(writes("OccluderView", members), host.size()), host);
+    EXPECT_EQ(sizeof(OccluderView), 6 * 4u);
+}
+
+TEST(SharedStructs, Constants)
+{
+    const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff}; // the largest float
+    EXPECT_EQ(on_device("    out[0] = TILE_WIDTH; out[1] = BLOCK; out[2] = as_int(NO_RECEIVER);\n", 3), host);
+    EXPECT_EQ(NO_RECEIVER, std::numeric_limits<float>::max());
+}
+
+} // namespace
+} // namespace penumbra::test
