@@ -18,27 +18,25 @@ __kernel void receivers_from_depth(const ReceiverView view, __global const float
     if (x >= view.stride || y >= view.rows) return;
 
     // The point as the camera sees it; integer tests on the bits, so that no compiler option can fold them away.
-    const bool inside = x < view.width && y < view.height;
-    const float z = inside ? depth[y * view.width + x] : 0.0f;
-    const bool there = inside && as_int(z) > 0 && as_int(z) < 0x7f800000;
+    // (Padding reads the border's depth: a load under a condition would keep PoCL from vectorising across work-items.)
+    const float z = depth[min(y, view.height - 1) * view.width + min(x, view.width - 1)];
+    const bool there = x < view.width && y < view.height && as_int(z) > 0 && as_int(z) < 0x7f800000;
     const float spread = view.camera_orthographic ? 1.0f : z;
-    const float px = ((2 * x + 1 - view.width) / (float)view.width) * view.camera_extent_x * spread;
-    const float py = ((view.height - 2 * y - 1) / (float)view.height) * view.camera_extent_y * spread;
+    const float px = (2 * x + 1 - view.width) * view.pixel_x * spread;
+    const float py = (view.height - 2 * y - 1) * view.pixel_y * spread;
 
     // The same point in light space.
-    const float* m = view.light_from_camera;
-    const float lx = fma(m[0], px, fma(m[1], py, fma(m[2], z, m[3])));
-    const float ly = fma(m[4], px, fma(m[5], py, fma(m[6], z, m[7])));
-    const float lz = fma(m[8], px, fma(m[9], py, fma(m[10], z, m[11])));
+    const float lx = fma(view.light_from_camera[0], px, fma(view.light_from_camera[1], py, fma(view.light_from_camera[2], z, view.light_from_camera[3])));
+    const float ly = fma(view.light_from_camera[4], px, fma(view.light_from_camera[5], py, fma(view.light_from_camera[6], z, view.light_from_camera[7])));
+    const float lz = fma(view.light_from_camera[8], px, fma(view.light_from_camera[9], py, fma(view.light_from_camera[10], z, view.light_from_camera[11])));
     const bool before = there && lz > 0.0f;
 
-    const float scale_x = view.light_orthographic ? view.light_extent_x : lz * view.light_extent_x;
-    const float scale_y = view.light_orthographic ? view.light_extent_y : lz * view.light_extent_y;
+    const float disparity = 1.0f / lz;
+    const float scale = view.light_orthographic ? 1.0f : disparity;
     const int at = y * view.stride + x;
-    xi[at] = before ? lx / scale_x : 0.0f;
-    eta[at] = before ? ly / scale_y : 0.0f;
-    // One over the smallest depths is beyond binary32: nearer to the light than anything, so nobody.
-    d[at] = before ? fmin(1.0f / lz, NO_RECEIVER) : NO_RECEIVER;
+    xi[at] = before ? lx * scale * view.per_light_x : 0.0f;
+    eta[at] = before ? ly * scale * view.per_light_y : 0.0f;
+    d[at] = before ? disparity : NO_RECEIVER;
 }
 
 inline float least(const float16 v)

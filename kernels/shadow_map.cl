@@ -24,7 +24,7 @@ inline float lit(const int2 size, __global const float2* restrict texels, const 
 // A receiver's place on the occluder map, in texels; texel (0, 0) reaches from 0 to 1.
 inline float2 place_of(const OccluderView occluders, const float xi, const float eta)
 {
-    return (float2)((xi + 1.0f) / occluders.texel_x, (1.0f - eta) / occluders.texel_y);
+    return (float2)((xi + 1.0f) * 0.5f * occluders.width, (1.0f - eta) * 0.5f * occluders.height);
 }
 
 // Whether the receiver is there and its filter can meet the map at all (so that the place fits an int).

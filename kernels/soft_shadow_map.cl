@@ -11,9 +11,7 @@
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"
 
-// receiver_limits: from which disparity on an occluder counts for a receiver.
-//
-//   limit [rows][stride]  d + bias; a texel shadows the receiver where its disparity is greater
+// From which disparity on an occluder counts for a receiver: d + bias.
 //
 // A receiver on the occluder map's own surface must not be shadowed by the stairs that the micro-patches make of that surface. Take the
 // surface as a plane with disparity steps (sx, sy) a texel, the receiver on it, and D = d_texel - d_receiver. A texel reaches the light only
@@ -23,30 +21,26 @@
 // the surface and no bound exists; it is held at 1/4 (a bias of two texel steps).
 // A receiver is on the surface when its own texel's disparity differs by no more than one step each way can explain.
 // Elsewhere only rounding counts: both disparities are right to a few units in the last place and to the depth's own `precision`.
-__kernel void receiver_limits(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision,
-                              __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
-                              __global const float* restrict eta, __global const float* restrict d, __global float* restrict limit)
+inline floatn limits_of(const OccluderView occluders, const float bias, const float precision, __global const float2* texels,
+                        __global const float2* steps, const floatn xi, const floatn eta, const floatn d)
 {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= receivers.stride || y >= receivers.rows) return;
-    const int at = y * receivers.stride + x;
-    const float own = d[at];
-    if (own == NO_RECEIVER) {
-        limit[at] = NO_RECEIVER;
-        return;
+    float column[LANES], row[LANES], surface[LANES], step_x[LANES], step_y[LANES];
+    store_lanes((xi + 1.0f) * (0.5f * occluders.width), column);
+    store_lanes((1.0f - eta) * (0.5f * occluders.height), row);
+    for (int lane = 0; lane < LANES; ++lane) {
+        const bool inside = column[lane] >= 0.0f && row[lane] >= 0.0f && column[lane] < (float)occluders.width && row[lane] < (float)occluders.height;
+        const int texel = inside ? (int)row[lane] * occluders.width + (int)column[lane] : 0;
+        surface[lane] = inside ? texels[texel].x : 0.0f;
+        step_x[lane] = steps[texel].x;
+        step_y[lane] = steps[texel].y;
     }
 
-    const float rounding = (8.0f * 0x1p-24f + 2.0f * precision) * own;
-    const float column = (xi[at] + 1.0f) / occluders.texel_x, row = (1.0f - eta[at]) / occluders.texel_y;
-    const bool inside = column >= 0.0f && row >= 0.0f && column < (float)occluders.width && row < (float)occluders.height;
-    const int texel = inside ? (int)row * occluders.width + (int)column : 0;
-    const float surface = inside ? texels[texel].x : 0.0f;
-    const float2 step = inside ? steps[texel] : (float2)(0.0f);
-
-    const bool on_surface = surface > 0.0f && fabs(surface - own) <= step.x + step.y + rounding;
-    const float bracket = 1.0f - 0.5f * (step.x / (occluders.light_scale_x * occluders.texel_x) + step.y / (occluders.light_scale_y * occluders.texel_y));
-    const float slope = 0.5f * (step.x + step.y) / fmax(bracket, 0.25f);
-    limit[at] = own + rounding + (on_surface ? bias * slope : 0.0f);
+    const floatn own = load_lanes(surface), sx = load_lanes(step_x), sy = load_lanes(step_y);
+    const floatn rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d;
+    const floatn bracket = 1.0f - (sx * occluders.edge_on_x + sy * occluders.edge_on_y);
+    const floatn slope = bias * 0.5f * (sx + sy) / select_lanes((floatn)(0.25f), bracket, bracket > 0.25f);
+    const floatn far = select_lanes((floatn)(0.0f), slope, fabs(own - d) <= sx + sy + rounding);
+    return d + rounding + select_lanes((floatn)(0.0f), far, own > 0.0f);
 }
 
 // Adds u v to a sum. With binary32 the product is not rounded on its own.
@@ -108,16 +102,18 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
 // soft_shadow_map: the share of the light that each receiver sees past the micro-patches of one occluder map.
 //
 //   texels [height][width]      (disparity, covered share) of the occluder map; blocks, superblocks: its pyramid's two levels
+//   steps [height][width]       disparity steps of the map's surface
 //   bounds [tiles]              boxes of the tiles of receivers
+//   bias, precision             see limits_of
 //   visibility [height][width]  1 - occlusion, 0 to 1. With `merge` the smaller of that and what is there (3.5: the larger occlusion of two maps)
 //   evaluated [tiles]           texels that were evaluated against the tile's receivers, added to what is there with `merge`
 //
 // Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Texels are added in one order, whatever the tile, so the same receiver
 // gets the same bits under any tiling.
-__kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, __global const float2* restrict texels,
-                              __global const float* restrict blocks, __global const float* restrict superblocks,
+__kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, const float bias, const float precision,
+                              __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict blocks, __global const float* restrict superblocks,
                               __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
-                              __global const float* restrict d, __global const float* restrict limit, __global float* restrict visibility,
+                              __global const float* restrict d, __global float* restrict visibility,
                               __global uint* restrict evaluated)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
@@ -125,7 +121,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
     const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
     const float8 box = bounds[tile];
 
-    floatn sum[ITEM_ROWS], lost[ITEM_ROWS];
+    floatn sum[ITEM_ROWS], lost[ITEM_ROWS], limit[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS; ++row) sum[row] = lost[row] = (floatn)(0.0f);
 
     const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
@@ -163,11 +159,17 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                         patches[found].a0 = a0;
                         ++found;
                     }
+                    // Most tiles never get here, so the limits wait for the first that does.
+                    if (count == 0 && found > 0)
+                        for (int row = 0; row < ITEM_ROWS; ++row) {
+                            const int at = (y + row) * receivers.stride + x;
+                            limit[row] = limits_of(occluders, bias, precision, texels, steps, load_lanes(xi + at), load_lanes(eta + at), load_lanes(d + at));
+                        }
                     count += found;
                     for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
                         const int at = (y + row) * receivers.stride + x;
                         add_patches(&sum[row], &lost[row], patches, found, b0, texel, scale, load_lanes(xi + at), load_lanes(eta + at),
-                                    load_lanes(d + at), load_lanes(limit + at));
+                                    load_lanes(d + at), limit[row]);
                     }
                 }
             }

@@ -29,12 +29,17 @@ MapSize reduced_size(int width, int height, int resolution)
 
 OccluderView occluder_view(const OccluderDepth& depth, MapSize size)
 {
+    const float scale_x = light_scale(depth.camera.half_extent.x, depth.light.half_u);
+    const float scale_y = light_scale(depth.camera.half_extent.y, depth.light.half_v);
+    const float texel_x = 2.0f / static_cast<float>(size.width), texel_y = 2.0f / static_cast<float>(size.height);
     return {.width = size.width,
             .height = size.height,
-            .texel_x = 2.0f / static_cast<float>(size.width),
-            .texel_y = 2.0f / static_cast<float>(size.height),
-            .light_scale_x = light_scale(depth.camera.half_extent.x, depth.light.half_u),
-            .light_scale_y = light_scale(depth.camera.half_extent.y, depth.light.half_v)};
+            .texel_x = texel_x,
+            .texel_y = texel_y,
+            .light_scale_x = scale_x,
+            .light_scale_y = scale_y,
+            .edge_on_x = 0.5f / (scale_x * texel_x),
+            .edge_on_y = 0.5f / (scale_y * texel_y)};
 }
 
 OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision)

@@ -26,10 +26,10 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
         view.light_from_camera[4 * row + 3] = static_cast<float>(axes_to[row].dot(offset));
     }
 
-    view.camera_extent_x = static_cast<float>(camera.half_extent.x);
-    view.camera_extent_y = static_cast<float>(camera.half_extent.y);
-    view.light_extent_x = static_cast<float>(light_view.half_extent.x);
-    view.light_extent_y = static_cast<float>(light_view.half_extent.y);
+    view.pixel_x = static_cast<float>(camera.half_extent.x / width);
+    view.pixel_y = static_cast<float>(camera.half_extent.y / height);
+    view.per_light_x = static_cast<float>(1 / light_view.half_extent.x);
+    view.per_light_y = static_cast<float>(1 / light_view.half_extent.y);
     view.camera_orthographic = camera.orthographic;
     view.light_orthographic = light_view.orthographic;
     view.width = width;

@@ -38,24 +38,22 @@ SoftShadowMapConstants constants_of(const opencl::Work& work, const SoftShadowMa
 
 // One pass over the receivers for one occluder map.
 void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const PreparedSoftShadowMap::Side& side, bool merge,
-                const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const opencl::Buffer<float>& limit,
-                const cl::Buffer& visibility, const opencl::Buffer<cl_uint>& evaluated)
+                const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility,
+                const opencl::Buffer<cl_uint>& evaluated)
 {
     const SoftShadowMapConstants constants = constants_of(work, prepared.settings);
     const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
-    work.launch(constants.specialisation(), "receiver_limits", {width, height}, {16, 8}, width * height * 16, receivers.view, prepared.view,
-                bias, precision, side.map.texels, side.map.steps, receivers.xi, receivers.eta, receivers.d, limit);
 
     // On a GPU a tile is a work-group; on a CPU device a work-item, and groups of one keep the share of each thread fine.
     const auto lanes = static_cast<std::size_t>(constants.lanes), rows = static_cast<std::size_t>(constants.item_rows);
     const std::array<std::size_t, 2> group =
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
-    const std::uint64_t bytes = width * height * 20 + side.map.texels.bytes();
+    const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
     work.launch(constants.specialisation(), "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
-                static_cast<cl_int>(merge), side.map.texels, side.blocks, side.superblocks, bounds, receivers.xi, receivers.eta,
-                receivers.d, limit, visibility, evaluated);
+                static_cast<cl_int>(merge), bias, precision, side.map.texels, side.map.steps, side.blocks, side.superblocks, bounds,
+                receivers.xi, receivers.eta, receivers.d, visibility, evaluated);
 }
 
 } // namespace
@@ -108,14 +106,13 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
     const std::size_t tiles_x = static_cast<std::size_t>(receivers.view.stride / TILE_WIDTH);
     const std::size_t tiles_y = static_cast<std::size_t>(receivers.view.rows / tile_rows);
     const auto bounds = work.buffer<cl_float8>(tiles_x * tiles_y, "tile bounds");
-    const auto limit = work.buffer<float>(receivers.d.count(), "receiver limits");
     const auto evaluated = work.buffer<cl_uint>(tiles_x * tiles_y, "evaluated texels");
     const cl_float2 half_inverse_scale{{0.5f / prepared.view.light_scale_x, 0.5f / prepared.view.light_scale_y}};
 
     work.launch(ReceiversConstants{}.specialisation(), "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view,
                 prepared.nearest, half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
     for (std::size_t i = 0; i < prepared.sides.size(); ++i)
-        shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, limit, visibility, evaluated);
+        shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) {

@@ -16,12 +16,12 @@
 
 // How a receiver's pixel becomes a point in light space.
 typedef struct {
-    float light_from_camera[12];           // 3 rows of 4: rotation and translation from the camera's (x, y, depth) to light space
-    float camera_extent_x, camera_extent_y; // tangents of the half angles, or half extents of an orthographic camera
-    float light_extent_x, light_extent_y;   // the same of the light's own view, the occluder map's
+    float light_from_camera[12];            // 3 rows of 4: rotation and translation from the camera's (x, y, depth) to light space
+    float pixel_x, pixel_y;                 // half a pixel's width and height: tangents, or lengths of an orthographic camera
+    float per_light_x, per_light_y;         // 1 over the light's own view's tangents, or over its half extents if orthographic
     int camera_orthographic, light_orthographic;
-    int width, height;                     // of the receiver map
-    int stride, rows;                      // of the padded lists of receivers
+    int width, height;                      // of the receiver map
+    int stride, rows;                       // of the padded lists of receivers
 } ReceiverView;
 
 // An occluder map and the light behind it.
@@ -29,6 +29,7 @@ typedef struct {
     int width, height;
     float texel_x, texel_y;         // a texel's width and height in xi and eta: 2 / width, 2 / height
     float light_scale_x, light_scale_y; // k of algorithms.md: light extent tangents over the light's full width and height
+    float edge_on_x, edge_on_y;     // 1 / (2 k h): times a surface's disparity step a texel, 1 where the surface is edge-on to the light
 } OccluderView;
 
 #endif

@@ -99,7 +99,7 @@ inline Overlap overlap(double low, double high, double place, double k, const Re
     return {value, {std::max(0.0, to.low - from.high - e / 2), to.high - from.low + (to.high > from.low ? e / 2 : 0)}};
 }
 
-// The disparity above which a texel counts (the kernel's receiver_limits): the receiver's own, plus rounding, plus, where the receiver lies
+// The disparity above which a texel counts (the kernel's limits_of): the receiver's own, plus rounding, plus, where the receiver lies
 // on the map's surface, what the stairs of that surface reach. An interval, because the receiver's texel is uncertain within rounding of
 // its border.
 inline Interval limit_of(const Map& map, const Receiver& p, const Settings& s)

@@ -39,23 +39,15 @@ std::string writes(const std::string& type, const std::vector<std::string>& memb
 
 TEST(SharedStructs, ReceiverView)
 {
-    const std::vector<std::string> members = {"light_from_camera",
-                                              "camera_extent_x",
-                                              "camera_extent_y",
-                                              "light_extent_x",
-                                              "light_extent_y",
-                                              "camera_orthographic",
-                                              "light_orthographic",
-                                              "width",
-                                              "height",
-                                              "stride",
-                                              "rows"};
+    const std::vector<std::string> members = {
+        "light_from_camera",  "pixel_x", "pixel_y", "per_light_x", "per_light_y", "camera_orthographic",
+        "light_orthographic", "width",   "height",  "stride",      "rows"};
     const std::vector<cl_int> host = {sizeof(ReceiverView),
                                       HERE(ReceiverView, light_from_camera),
-                                      HERE(ReceiverView, camera_extent_x),
-                                      HERE(ReceiverView, camera_extent_y),
-                                      HERE(ReceiverView, light_extent_x),
-                                      HERE(ReceiverView, light_extent_y),
+                                      HERE(ReceiverView, pixel_x),
+                                      HERE(ReceiverView, pixel_y),
+                                      HERE(ReceiverView, per_light_x),
+                                      HERE(ReceiverView, per_light_y),
                                       HERE(ReceiverView, camera_orthographic),
                                       HERE(ReceiverView, light_orthographic),
                                       HERE(ReceiverView, width),
@@ -69,12 +61,14 @@ TEST(SharedStructs, ReceiverView)
 
 TEST(SharedStructs, OccluderView)
 {
-    const std::vector<std::string> members = {"width", "height", "texel_x", "texel_y", "light_scale_x", "light_scale_y"};
+    const std::vector<std::string> members = {"width",         "height",        "texel_x",   "texel_y",
+                                              "light_scale_x", "light_scale_y", "edge_on_x", "edge_on_y"};
     const std::vector<cl_int> host = {
-        sizeof(OccluderView),        HERE(OccluderView, width),         HERE(OccluderView, height),       HERE(OccluderView, texel_x),
-        HERE(OccluderView, texel_y), HERE(OccluderView, light_scale_x), HERE(OccluderView, light_scale_y)};
+        sizeof(OccluderView),         HERE(OccluderView, width),         HERE(OccluderView, height),        HERE(OccluderView, texel_x),
+        HERE(OccluderView, texel_y),  HERE(OccluderView, light_scale_x), HERE(OccluderView, light_scale_y), HERE(OccluderView, edge_on_x),
+        HERE(OccluderView, edge_on_y)};
     EXPECT_EQ(on_device(writes("OccluderView", members), host.size()), host);
-    EXPECT_EQ(sizeof(OccluderView), 6 * 4u);
+    EXPECT_EQ(sizeof(OccluderView), 8 * 4u);
 }
 
 TEST(SharedStructs, Constants)
