@@ -13,6 +13,8 @@ for name in "$@"; do
     "$bench" "$name" > "out/bench/$name.csv.part"
     mv "out/bench/$name.csv.part" "out/bench/$name.csv"
 done
+echo "bench startup" >&2
+bench/startup.sh > out/bench/startup.md
 if command -v gnuplot > /dev/null; then
     gnuplot -e "csv='out/bench'; out='docs/pictures'" bench/plots.gp || echo "bench/run.sh: some plots lack their CSV" >&2
 fi
