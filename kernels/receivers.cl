@@ -29,7 +29,8 @@ __kernel void receivers_from_depth(const ReceiverView view, __global const float
     const float lx = fma(view.light_from_camera[0], px, fma(view.light_from_camera[1], py, fma(view.light_from_camera[2], z, view.light_from_camera[3])));
     const float ly = fma(view.light_from_camera[4], px, fma(view.light_from_camera[5], py, fma(view.light_from_camera[6], z, view.light_from_camera[7])));
     const float lz = fma(view.light_from_camera[8], px, fma(view.light_from_camera[9], py, fma(view.light_from_camera[10], z, view.light_from_camera[11])));
-    const bool before = there && lz > 0.0f;
+    // Nearer than the least normal number counts as at the light: one over it would be beyond binary32.
+    const bool before = there && lz >= 0x1p-126f;
 
     const float disparity = 1.0f / lz;
     const float scale = view.light_orthographic ? 1.0f : disparity;

@@ -72,26 +72,26 @@ inline bool reaches(const float nearest, const float a0, const float a1, const f
     return a0 - wide_x <= box.s1 && a1 + wide_x >= box.s0 && b0 - wide_y <= box.s3 && b1 + wide_y >= box.s2;
 }
 
-// A texel that can hide some of the light from the tile, and where its left edge lies.
+// A texel that can hide some of the light from the tile, and where its left and right edges lie.
 typedef struct {
-    float d, covered, a0;
+    float d, covered, a0, a1;
 } Patch;
 
 // Adds the shares of a row of patches for LANES receivers (3.4 and 4.2: back-project, intersect, multiply).
 //     u(a) = 1/2 + (a - xi) k / (d - d_p)      on a light scaled to [0, 1]
-// The right edge is taken from the left one, u(a1) = u(a0) + h k / (d - d_p): that moves it by at most 2^-24 of the texel.
-inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const int count, const float b0, const float2 texel, const float2 scale,
+// N.B. Every edge is projected on its own: neighbours then share it to the bit. u(a1) = u(a0) + h k / (d - d_p) would spare a subtraction but move
+// the edge by 2^-24 of the texel, which is more than the whole light when that is a point, and a receiver on a border would see between texels.
+inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const int count, const float b0, const float b1, const float2 scale,
                         const floatn xi, const floatn eta, const floatn d, const floatn limit)
 {
-    const floatn below = b0 - eta;
+    const floatn below = b0 - eta, above = b1 - eta;
     floatn total = *sum, rest = *lost;
     for (int i = 0; i < count; ++i) {
         const Patch patch = patches[i];
         const floatn reach = 1.0f / (patch.d - d);
         const floatn du = scale.x * reach, dv = scale.y * reach;
-        const floatn u0 = fma(patch.a0 - xi, du, (floatn)(0.5f)), v0 = fma(below, dv, (floatn)(0.5f));
-        const floatn u = saturate(fma((floatn)(texel.x), du, u0)) - saturate(u0);
-        const floatn v = saturate(fma((floatn)(texel.y), dv, v0)) - saturate(v0);
+        const floatn u = saturate(fma(patch.a1 - xi, du, (floatn)(0.5f))) - saturate(fma(patch.a0 - xi, du, (floatn)(0.5f)));
+        const floatn v = saturate(fma(above, dv, (floatn)(0.5f))) - saturate(fma(below, dv, (floatn)(0.5f)));
         const floatn counted = select_lanes((floatn)(0.0f), u, patch.d > limit);
         ACCUMULATE(total, rest, counted, v * patch.covered);
     }
@@ -157,6 +157,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                         patches[found].d = t.x;
                         patches[found].covered = t.y;
                         patches[found].a0 = a0;
+                        patches[found].a1 = a1;
                         ++found;
                     }
                     // Most tiles never get here, so the limits wait for the first that does.
@@ -168,7 +169,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                     count += found;
                     for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
                         const int at = (y + row) * receivers.stride + x;
-                        add_patches(&sum[row], &lost[row], patches, found, b0, texel, scale, load_lanes(xi + at), load_lanes(eta + at),
+                        add_patches(&sum[row], &lost[row], patches, found, b0, b1, scale, load_lanes(xi + at), load_lanes(eta + at),
                                     load_lanes(d + at), limit[row]);
                     }
                 }
