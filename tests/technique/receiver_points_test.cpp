@@ -42,9 +42,9 @@ TEST(ReceiverPoints, OfTheLightsView)
                     EXPECT_EQ(p.d, NO_RECEIVER);
                     continue;
                 }
-                // The pixel's place, times extent, times depth, over extent times depth: five roundings.
-                EXPECT_NEAR(p.xi, (2 * x + 1.0) / width - 1, 5 * 0x1p-24);
-                EXPECT_NEAR(p.eta, 1 - (2 * y + 1.0) / height, 5 * 0x1p-24);
+                // The pixel's tangents (2 roundings), times depth, times disparity (itself rounded), over the light's tangents (2).
+                EXPECT_NEAR(p.xi, (2 * x + 1.0) / width - 1, 7 * 0x1p-24);
+                EXPECT_NEAR(p.eta, 1 - (2 * y + 1.0) / height, 7 * 0x1p-24);
                 EXPECT_EQ(p.d, 1 / z);
             }
     }
