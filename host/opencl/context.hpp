@@ -33,6 +33,7 @@ public:
     const cl::Device& device() const { return device_; }
     const DeviceInfo& info() const { return info_; }
     const Quirks& quirks() const { return quirks_; }
+    Quirks& quirks() { return quirks_; } // tests run the kernels of other devices on this one
 
     // A queue of its own for one piece of work: in order, profiling on.
     cl::CommandQueue queue() const;

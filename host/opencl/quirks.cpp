@@ -71,10 +71,7 @@ void prepare_environment()
 Quirks quirks_of(const cl::Device& device)
 {
     Quirks quirks;
-    if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) {
-        quirks.lanes = 16;
-        quirks.tile_group = 1;
-    }
+    if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) quirks.lanes = 16;
     const std::string platform = cl::Platform(device.getInfo<CL_DEVICE_PLATFORM>()).getInfo<CL_PLATFORM_NAME>();
     quirks.keep_binaries = platform.find("Portable Computing Language") == std::string::npos;
     return quirks;

@@ -4,6 +4,12 @@
 #ifndef PENUMBRA_COMMON_SHARED_H
 #define PENUMBRA_COMMON_SHARED_H
 
+// Products and sums are joined where the kernels say fma and nowhere else: compilers choose differently for scalars and vectors, and the same
+// receiver would get other bits under another number of lanes.
+#ifdef __OPENCL_VERSION__
+#pragma OPENCL FP_CONTRACT OFF
+#endif
+
 // Receivers are worked on in tiles of this many columns; a row of receivers is padded to a multiple of it.
 #define TILE_WIDTH 16
 

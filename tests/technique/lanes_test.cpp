@@ -1,4 +1,6 @@
 // The kernels of other kinds of device, on this one: lanes are a matter of speed, never of the result.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "support/device_run.hpp"
@@ -11,9 +13,11 @@ class Lanes : public testing::TestWithParam<Accumulator> {};
 
 TEST_P(Lanes, GiveTheSameBits)
 {
-    SoftCase c{
-        .front = random_map(93, 61, 2, 4, 0.3, 7), .back = random_map(93, 61, 3, 5, 0.3, 8), .receivers = random_map(61, 47, 4, 9, 0.1, 9)};
-    c.settings.accumulator = GetParam();
+    const SoftCase c{.front = random_map(93, 61, 2, 4, 0.3, 7),
+                     .back = random_map(93, 61, 3, 5, 0.3, 8),
+                     .settings = {.accumulator = GetParam()},
+                     .receivers = random_map(61, 47, 4, 9, 0.1, 9),
+                     .camera = {}};
 
     const auto context = device_context(true);
     std::vector<std::vector<float>> masks;
