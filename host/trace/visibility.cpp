@@ -220,8 +220,8 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
         rays.id[i] = 0;
         rays.flags[i] = 0;
     }
-    // Without Embree's coherent flag: on the bunny that took 1.0 (1024 samples) to 1.8 times (16) as long, packets of 8 and streams longer
-    // still.
+    // Without Embree's coherent flag. CPU time on the bunny with it: 1.8, 1.6, 1.3 and 0.97 times at 16, 64, 256 and 1024 samples. Without
+    // it, packets of 8 take 1.1 to 1.2 times, streams of 16 single rays 1.3 to 1.4 times; flushing denormals gains nothing.
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
