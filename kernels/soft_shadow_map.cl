@@ -6,7 +6,8 @@
 //   TILE_ROWS    rows of a tile; a tile is TILE_WIDTH x TILE_ROWS receivers and shares one search
 //   ACCUMULATOR  0 binary32, 1 compensated (Kahan), 2 binary16 (emulated; Appendix A)
 //
-// Precision: strict IEEE arithmetic, one correctly rounded division a pair. Each share of the light is off by at most 2^-21 (tests/oracle).
+// Precision: strict IEEE arithmetic, one correctly rounded division a pair. A share of the light is off by less than 2^-19 where the
+// back-projected texel is no wider than the light (derived in tests/oracle).
 #include "common/shared.h"
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"

@@ -138,6 +138,21 @@ TEST(Accumulator, Binary16AtOddSizes)
     EXPECT_GT(error(150), 0.25);
 }
 
+// 45,000 equal shares, half the plane: the light is hidden up to u = 1/2 + (600 / 601 - 1). Neighbours share their edges, so that overlaps
+// sum to that but for the last edge (7/2 e, e = 2^-24) and what each share rounds (e of itself per axis and for the product); the
+// compensated sum adds 2 e and the result 1/2 e. Recursive binary32 drifts beyond that.
+TEST(Accumulator, CompensatedDoesNotDrift)
+{
+    const double expected = 0.5 + (600 / 601.0 - 1), bound = 9 * 0x1p-24;
+    const auto error = [&](Accumulator accumulator) {
+        SoftCase c = plane_of_patches(601, accumulator);
+        c.front = boxes(601, 601, 4, {{0, 300, 0, 601}});
+        return std::abs(1 - run(device_context(), c).visibility[0] - expected);
+    };
+    EXPECT_LE(error(Accumulator::compensated), bound);
+    EXPECT_GT(error(Accumulator::binary32), 10 * bound);
+}
+
 // Many small shares: each accumulator keeps its own bound, and the compensated one is the closer where both are measured.
 TEST(Accumulator, CompensatedIsCloserThanBinary32)
 {
