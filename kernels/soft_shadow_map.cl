@@ -61,16 +61,34 @@ inline floatn limits_of(const OccluderView occluders, const float bias, const fl
 #define ACCUMULATE(sum, lost, u, v) (sum) = round_to_half((sum) + round_to_half((u) * (v)))
 #endif
 
-// Whether a block of texels from (a0, b0) to (a1, b1), none nearer to the light than `nearest`, can hide any of the light from any receiver
-// of a tile: its penumbra extent on the furthest receivers (algorithms.md: e = (d - d_p) / (2 k)) meets the tile's box. The extent is widened
-// by 2^-20, which covers the rounding of this test and of the pairs it spares: a texel that it drops would have added exactly 0.
-inline bool reaches(const float nearest, const float a0, const float a1, const float b0, const float b1, const float8 box, const float2 half_inverse_scale)
+// What a tile's search needs of the occluder map and the light.
+typedef struct {
+    float8 box;                // of the tile's receivers, as tile_bounds wrote it
+    float2 half_inverse_scale; // 1 / (2 k)
+    float2 texel;              // width and height in xi and eta
+} Search;
+
+// How far the penumbra of a texel at disparity `nearest` reaches beyond its edges on the tile's furthest receivers (algorithms.md:
+// e = (d - d_p) / (2 k)). Widened by 2^-20, which covers the rounding of this search and of the pairs that it spares: a texel that it drops
+// would have added exactly 0. Negative: not above the furthest receiver, so none.
+inline float2 penumbra_extent(const Search search, const float nearest)
 {
-    const float rise = nearest - box.s4;
-    if (!(rise > 0.0f)) return false;
-    const float ex = rise * half_inverse_scale.x, ey = rise * half_inverse_scale.y;
-    const float wide_x = fma(0x1p-20f, 1.0f + ex, ex), wide_y = fma(0x1p-20f, 1.0f + ey, ey);
-    return a0 - wide_x <= box.s1 && a1 + wide_x >= box.s0 && b0 - wide_y <= box.s3 && b1 + wide_y >= box.s2;
+    const float rise = nearest - search.box.s4;
+    const float2 extent = rise * search.half_inverse_scale;
+    return rise > 0.0f ? fma((float2)(0x1p-20f), 1.0f + extent, extent) : (float2)(-1.0f);
+}
+
+// The cells (texels, blocks, superblocks) whose penumbra can meet the tile's box: (first x, first y, last x, last y), the last ones not
+// included. Cell (i, j) of size `cell` lies at xi = i cell.x - 1 and eta = 1 - (j + 1) cell.y; none holds anything nearer than `nearest`. Only cells
+// from `low` to below `high`. The 1/16 of a cell covers the rounding of places: at 65536 texels a side, 3 roundings of 2^-24 come to 0.012.
+inline int4 window(const Search search, const float nearest, const float2 cell, const int2 low, const int2 high)
+{
+    const float2 extent = penumbra_extent(search, nearest);
+    if (extent.x < 0.0f) return (int4)(0);
+    const float2 first = (float2)(search.box.s0 - extent.x + 1.0f, 1.0f - search.box.s3 - extent.y) / cell - (17.0f / 16.0f);
+    const float2 last = (float2)(search.box.s1 + extent.x + 1.0f, 1.0f - search.box.s2 + extent.y) / cell + (17.0f / 16.0f);
+    const float2 lowest = convert_float2(low), highest = convert_float2(high);
+    return (int4)(convert_int2(ceil(clamp(first, lowest, highest))), convert_int2(floor(clamp(last, lowest, highest))));
 }
 
 // A texel that can hide some of the light from the tile, and where its left and right edges lie.
@@ -100,8 +118,38 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
     *lost = rest;
 }
 
+// The texels of row j from `first` to below `last` that are above the tile's furthest receiver; at most BLOCK.
+inline int patches_of_row(Patch* patches, __global const float2* texels, const int width, const Search search, const int j, const int first, const int last)
+{
+    int found = 0;
+    for (int i = first; i < last; ++i) {
+        const float2 t = texels[j * width + i];
+        if (!(t.x > search.box.s4)) continue;
+        patches[found].d = t.x;
+        patches[found].covered = t.y;
+        patches[found].a0 = i * search.texel.x - 1.0f;
+        patches[found].a1 = (i + 1) * search.texel.x - 1.0f;
+        ++found;
+    }
+    return found;
+}
+
+// Writes LANES values of a row, or as many of them as lie in it; with `merge` where they are smaller than what is there.
+inline void write_visibility(__global float* to, const floatn seen, const int left, const int merge)
+{
+    if (left >= LANES) {
+        const floatn before = merge ? load_lanes(to) : seen;
+        store_lanes(select_lanes(before, seen, seen < before), to);
+        return;
+    }
+    float lanes[LANES];
+    store_lanes(seen, lanes);
+    for (int lane = 0; lane < left; ++lane) to[lane] = merge && to[lane] < lanes[lane] ? to[lane] : lanes[lane];
+}
+
 // soft_shadow_map: the share of the light that each receiver sees past the micro-patches of one occluder map.
 //
+//   nearest                     the greatest disparity on the map
 //   texels [height][width]      (disparity, covered share) of the occluder map; blocks, superblocks: its pyramid's two levels
 //   steps [height][width]       disparity steps of the map's surface
 //   bounds [tiles]              boxes of the tiles of receivers
@@ -111,81 +159,57 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
 //
 // Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Texels are added in one order, whatever the tile, so the same receiver
 // gets the same bits under any tiling.
-__kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, const float bias, const float precision,
-                              __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict blocks, __global const float* restrict superblocks,
-                              __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
-                              __global const float* restrict d, __global float* restrict visibility,
-                              __global uint* restrict evaluated)
+__kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, const float nearest, const float bias,
+                              const float precision, __global const float2* restrict texels, __global const float2* restrict steps,
+                              __global const float* restrict blocks, __global const float* restrict superblocks, __global const float8* restrict bounds,
+                              __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
+                              __global float* restrict visibility, __global uint* restrict evaluated)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= receivers.stride || y >= receivers.rows) return;
     const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
-    const float8 box = bounds[tile];
 
     floatn sum[ITEM_ROWS], lost[ITEM_ROWS], limit[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS; ++row) sum[row] = lost[row] = (floatn)(0.0f);
-
-    const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
-    const float2 half_inverse_scale = 0.5f / scale;
-    const float2 texel = (float2)(occluders.texel_x, occluders.texel_y);
-    const int2 size = (int2)(occluders.width, occluders.height);
-    const int2 block_count = (size + (BLOCK - 1)) / BLOCK;
-    const int2 super_count = (block_count + (BLOCK - 1)) / BLOCK;
     uint count = 0;
 
-    // Down the pyramid: superblocks, blocks, texels. Edge i of the map lies at xi = i * texel_x - 1 and at eta = 1 - i * texel_y.
-    for (int s = 0; s < super_count.x * super_count.y; ++s) {
+    const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
+    const Search search = {bounds[tile], 0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
+    const int2 size = (int2)(occluders.width, occluders.height);
+    const int2 block_count = (size + (BLOCK - 1)) / BLOCK, super_count = (block_count + (BLOCK - 1)) / BLOCK;
+
+    // Down the pyramid: superblocks, blocks, texels, each only where a penumbra can meet the tile.
+    const int4 supers = window(search, nearest, search.texel * (BLOCK * BLOCK), (int2)(0), super_count);
+    for (int s = supers.y * super_count.x; s < supers.w * super_count.x; ++s) {
         const int2 super = (int2)(s % super_count.x, s / super_count.x);
-        const int2 first_block = super * BLOCK, last_block = min(first_block + BLOCK, block_count);
-        const int2 low = first_block * BLOCK, high = min(last_block * BLOCK, size);
-        if (!reaches(superblocks[s], low.x * texel.x - 1.0f, high.x * texel.x - 1.0f, 1.0f - high.y * texel.y, 1.0f - low.y * texel.y, box, half_inverse_scale))
-            continue;
-        for (int by = first_block.y; by < last_block.y; ++by)
-            for (int bx = first_block.x; bx < last_block.x; ++bx) {
-                const int2 from = (int2)(bx, by) * BLOCK, to = min(from + BLOCK, size);
-                if (!reaches(blocks[by * block_count.x + bx], from.x * texel.x - 1.0f, to.x * texel.x - 1.0f, 1.0f - to.y * texel.y,
-                             1.0f - from.y * texel.y, box, half_inverse_scale))
-                    continue;
-                for (int j = from.y; j < to.y; ++j) {
-                    // The texels of this row that matter to the tile, then all of them for each row of receivers.
-                    const float b0 = 1.0f - (j + 1) * texel.y, b1 = 1.0f - j * texel.y;
+        if (super.x < supers.x || super.x >= supers.z) continue;
+        const int2 low = super * BLOCK;
+        const int4 inside = window(search, superblocks[s], search.texel * BLOCK, low, min(low + BLOCK, block_count));
+        for (int by = inside.y; by < inside.w; ++by)
+            for (int bx = inside.x; bx < inside.z; ++bx) {
+                const int2 first = (int2)(bx, by) * BLOCK;
+                const int4 near = window(search, blocks[by * block_count.x + bx], search.texel, first, min(first + BLOCK, size));
+                for (int j = near.y; j < near.w; ++j) {
                     Patch patches[BLOCK];
-                    int found = 0;
-                    for (int i = from.x; i < to.x; ++i) {
-                        const float2 t = texels[j * size.x + i];
-                        const float a0 = i * texel.x - 1.0f, a1 = (i + 1) * texel.x - 1.0f;
-                        if (!reaches(t.x, a0, a1, b0, b1, box, half_inverse_scale)) continue;
-                        patches[found].d = t.x;
-                        patches[found].covered = t.y;
-                        patches[found].a0 = a0;
-                        patches[found].a1 = a1;
-                        ++found;
-                    }
+                    const int found = patches_of_row(patches, texels, size.x, search, j, near.x, near.z);
+
                     // Most tiles never get here, so the limits wait for the first that does.
-                    if (count == 0 && found > 0)
-                        for (int row = 0; row < ITEM_ROWS; ++row) {
-                            const int at = (y + row) * receivers.stride + x;
-                            limit[row] = limits_of(occluders, bias, precision, texels, steps, load_lanes(xi + at), load_lanes(eta + at), load_lanes(d + at));
-                        }
+                    const bool first_found = count == 0 && found > 0;
                     count += found;
                     for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
                         const int at = (y + row) * receivers.stride + x;
-                        add_patches(&sum[row], &lost[row], patches, found, b0, b1, scale, load_lanes(xi + at), load_lanes(eta + at),
-                                    load_lanes(d + at), limit[row]);
+                        const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
+                        if (first_found) limit[row] = limits_of(occluders, bias, precision, texels, steps, own_xi, own_eta, own_d);
+                        add_patches(&sum[row], &lost[row], patches, found, 1.0f - (j + 1) * search.texel.y, 1.0f - j * search.texel.y, scale, own_xi,
+                                    own_eta, own_d, limit[row]);
                     }
                 }
             }
     }
 
     // Overlapping patches may sum to more than the whole light.
-    for (int row = 0; row < ITEM_ROWS; ++row) {
-        float seen[LANES];
-        store_lanes(1.0f - saturate(sum[row]), seen);
-        for (int lane = 0; lane < LANES; ++lane) {
-            if (x + lane >= receivers.width || y + row >= receivers.height) continue;
-            const int at = (y + row) * receivers.width + x + lane;
-            visibility[at] = merge ? fmin(visibility[at], seen[lane]) : seen[lane];
-        }
-    }
+    if (merge && count == 0) return;
+    for (int row = 0; row < ITEM_ROWS && y + row < receivers.height; ++row)
+        write_visibility(visibility + (y + row) * receivers.width + x, 1.0f - saturate(sum[row]), receivers.width - x, merge);
     if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[tile] = merge ? evaluated[tile] + count : count;
 }
