@@ -59,6 +59,18 @@ void light_size(const Engine& engine)
     for (const Occluder occluder : {Occluder::square, Occluder::bunny, Occluder::horse})
         for (const double side : {0.01, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.4, 2.0, 3.0})
             both_versions(engine, "light_size", occluder, {.light_side = side, .receiver_resolution = 256}, side, 3);
+
+    // Fig. 24: the same over maps of several resolutions, two-sided.
+    for (const double side : {0.01, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.4, 2.0, 3.0}) {
+        const Image reference =
+            reference_of(engine, paper_scene(Occluder::bunny, {.light_side = side, .receiver_resolution = 256}), sweep_samples);
+        for (const auto& [texels, bench] :
+             {std::pair{64, "light_size_64"}, {128, "light_size_128"}, {256, "light_size_256"}, {512, "light_size_512"}}) {
+            const Scene scene =
+                paper_scene(Occluder::bunny, {.light_side = side, .occluder_resolution = texels, .receiver_resolution = 256});
+            emit(measure(engine, scene, SoftShadowMap{}, reference, 3), bench, Occluder::bunny, side);
+        }
+    }
 }
 
 void lateral(const Engine& engine)

@@ -4,7 +4,7 @@ set datafile separator ","
 set terminal pngcairo size 900,520 font "DejaVu Sans,11"
 set key outside right top
 set grid
-rows(file, scene, setting) = sprintf("< grep ',%s,soft_shadow_map,' %s/%s.csv | grep '%s'", scene, csv, file, setting)
+rows(file, scene, setting) = sprintf("< grep '^%s,%s,soft_shadow_map,' %s/%s.csv | grep '%s'", file, scene, csv, file, setting)
 
 set style line 1 lc rgb "#1f77b4" lw 2 pt 7 ps 0.8
 set style line 2 lc rgb "#1f77b4" lw 2 pt 6 ps 0.8 dt 2
@@ -26,6 +26,12 @@ do for [figure in "resolution light_size lateral vertical"] {
          rows(figure, "horse", "sides=front") using 5:6 with linespoints ls 4 title "horse, one-sided", \
          rows(figure, "square", "sides=front") using 5:6 with linespoints ls 5 title "square"
 }
+
+set output sprintf("%s/soft_shadow_map_light_and_resolution.png", out)
+set xlabel "side of the light"
+set logscale x
+plot for [n in "64 128 256 512"] sprintf("< grep '^light_size_%s,' %s/light_size.csv", n, csv) using 5:6 with linespoints lw 2 title n." texels a side"
+unset logscale x
 
 set output sprintf("%s/soft_shadow_map_texels.png", out)
 set xlabel "occluder texels (thousands)"

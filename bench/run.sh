@@ -1,6 +1,6 @@
 #!/bin/sh
 # Runs benches, writes out/bench/NAME.csv and, when gnuplot is there, the plots of docs/pictures.
-#     bench/run.sh [BENCH...]     all of them without arguments: about half an hour on two cores
+#     bench/run.sh [BENCH...]     all of them without arguments: some minutes on two cores
 # Needs a build: cmake --preset release && cmake --build --preset release
 set -eu
 cd "$(dirname "$0")/.."

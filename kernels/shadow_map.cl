@@ -1,17 +1,22 @@
 // Shadow mapping from the light's centre (Williams 1978) and its filtered forms: the baselines that the papers compare with.
 #include "common/shared.h"
+#include "occluders.cl"
+#include "receivers.cl"
 
 // How far above a receiver a texel must be to shadow it: on a plane no texel that the filter compares is.
 //     bound = reach (sx + sy), reach in texels from the receiver to the furthest texel's centre along one axis
-// plus the rounding of both disparities and of the depth they came from.
-inline float bias_of(const OccluderView occluders, __global const float2* restrict steps, const float2 position, const float d, const float bias,
-                     const float precision, const float reach)
+// where the receiver lies on the surface that the map shows there, that is, within one step each way of it; elsewhere the texel's slope says
+// nothing about the receiver. Always, the rounding of both disparities and of the depth that they came from.
+inline float bias_of(const OccluderView occluders, __global const float2* restrict texels, __global const float2* restrict steps,
+                     const float2 position, const float d, const float bias, const float precision, const float reach)
 {
     const int2 size = (int2)(occluders.width, occluders.height);
-    const int2 texel = convert_int2_rtn(position);
-    const bool inside = texel.x >= 0 && texel.y >= 0 && texel.x < size.x && texel.y < size.y;
-    const float2 step = inside ? steps[texel.y * size.x + texel.x] : (float2)(0.0f);
-    return bias * reach * (step.x + step.y) + (8.0f * 0x1p-24f + 2.0f * precision) * d;
+    const int2 place = convert_int2_rtn(position);
+    const bool inside = place.x >= 0 && place.y >= 0 && place.x < size.x && place.y < size.y;
+    const int texel = inside ? place.y * size.x + place.x : 0;
+    const float step = steps[texel].x + steps[texel].y, rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d;
+    const bool on_surface = inside && texels[texel].x > 0.0f && fabs(texels[texel].x - d) <= step + rounding;
+    return rounding + (on_surface ? bias * reach * step : 0.0f);
 }
 
 // 1 where the texel leaves the receiver lit; beyond the map's border nothing casts shadows.
@@ -51,7 +56,7 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
         // The window of texels whose centres lie nearest to the receiver.
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));
-        const float limit = d[at] + bias_of(occluders, steps, place, d[at], bias, precision, 0.5f * taps);
+        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 0.5f * taps);
         sum = 0.0f;
         for (int j = 0; j < taps; ++j)
             for (int i = 0; i < taps; ++i) sum += lit(size, texels, first.x + i, first.y + j, limit);
@@ -73,7 +78,7 @@ __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderVie
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 t = place - 0.5f - convert_float2(low), s = 1.0f - t;
-        const float limit = d[at] + bias_of(occluders, steps, place, d[at], bias, precision, 2.0f);
+        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 2.0f);
 
         // The B-spline's four weights along each axis; they sum to 1.
         const float2 w[4] = {s * s * s / 6.0f, (4.0f - 6.0f * t * t + 3.0f * t * t * t) / 6.0f, (4.0f - 6.0f * s * s + 3.0f * s * s * s) / 6.0f,

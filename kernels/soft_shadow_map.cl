@@ -9,6 +9,8 @@
 // Precision: strict IEEE arithmetic, one correctly rounded division a pair. A share of the light is off by less than 2^-19 where the
 // back-projected texel is no wider than the light (derived in tests/oracle).
 #include "common/shared.h"
+#include "occluders.cl"
+#include "receivers.cl"
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"
 

@@ -1,4 +1,5 @@
 // penumbra mask: one scene, one mask.
+#include <future>
 #include <memory>
 
 #include <penumbra/engine.hpp>
@@ -7,6 +8,7 @@
 #include <penumbra/scene.hpp>
 
 #include "files.hpp"
+#include "opencl/quirks.hpp"
 #include "progress.hpp"
 #include "streams.hpp"
 #include "technique_flags.hpp"
@@ -51,6 +53,11 @@ int run(const Flags& flags)
 
     require_not_named_in(flags.scene, flags.mask, "-o");
 
+    // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
+    // is set first: nothing may read it meanwhile.
+    opencl::prepare_environment();
+    std::future<Engine> opening = std::async(std::launch::async, [&] { return open_engine(flags.device); });
+
     Progress progress;
     progress.step("reading " + flags.scene);
     Scene scene = read_scene(flags.scene);
@@ -58,7 +65,7 @@ int run(const Flags& flags)
     scene.technique = in_scene(flags.scene, [&] { return apply(scene.technique, flags.technique); });
 
     progress.step("opening the device");
-    const Engine engine = open_engine(flags.device);
+    const Engine engine = opening.get();
 
     progress.step("computing the mask by " + scene.technique.kind);
     const Mask mask = in_scene(flags.scene, [&] { return engine.mask(scene); });

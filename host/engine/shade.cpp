@@ -35,6 +35,13 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
         shade_shadow_map(work, std::get<PreparedShadowMap>(state.data), points, visibility);
 }
 
+// The program that the state was prepared with.
+const opencl::Specialisation& program_of(const Prepared::State& state)
+{
+    const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data);
+    return soft ? soft->program : std::get<PreparedShadowMap>(state.data).program;
+}
+
 // Depth of the receivers as the light sees them: from the objects that receive, else from the surfaces that the receivers' own depth shows.
 DepthMap light_view_depth(const Prepared::State& state, const Receivers& receivers, const Camera& camera, int resolution)
 {
@@ -74,7 +81,8 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
         work.stage("upload receivers");
         const auto uploaded = work.upload(std::span<const float>(depth.depth), "receiver depth");
         work.stage("receivers");
-        return receiver_points(work, receiver_view(view, depth.width, depth.height, state.light_view), uploaded.memory(), depth.precision);
+        return receiver_points(work, receiver_view(view, depth.width, depth.height, state.light_view), uploaded.memory(), depth.precision,
+                               program_of(state));
     };
     const auto visibility = work.buffer<float>(count, "visibility");
     ShadeCounts counts;
@@ -85,7 +93,7 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
         shade_points(work, state, lit_points, light_mask.memory(), &counts);
         const ReceiverPoints points = points_of(*receivers.depth, camera);
         work.stage("project");
-        sample_mask(work, points, light_mask.memory(), light_resolution, light_resolution, visibility.memory());
+        sample_mask(work, points, light_mask.memory(), light_resolution, light_resolution, visibility.memory(), program_of(state));
     } else {
         const ReceiverPoints points = points_of(*receivers.depth, camera);
         work.stage("shade");
@@ -143,7 +151,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
     opencl::Work work(state.context, queue);
     work.stage("shade");
     const ReceiverView view = receiver_view(camera, receivers.width, receivers.height, state.light_view);
-    const ReceiverPoints points = receiver_points(work, view, cl::Buffer(receivers.depth, true), 0x1p-24);
+    const ReceiverPoints points = receiver_points(work, view, cl::Buffer(receivers.depth, true), 0x1p-24, program_of(state));
     shade_points(work, state, points, cl::Buffer(visibility, true), nullptr);
     work.finish();
 }

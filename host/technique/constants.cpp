@@ -6,7 +6,7 @@ opencl::Specialisation ReceiversConstants::specialisation() const { return {"rec
 
 opencl::Specialisation OccludersConstants::specialisation() const { return {"occluders.cl", {}}; }
 
-opencl::Specialisation ShadowMapConstants::specialisation() const { return {"shadow_map.cl", {}}; }
+opencl::Specialisation ShadowMapConstants::specialisation() const { return {"shadow_map.cl", {{"TILE_ROWS", std::to_string(rows)}}}; }
 
 opencl::Specialisation SoftShadowMapConstants::specialisation() const
 {

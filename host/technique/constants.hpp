@@ -1,4 +1,7 @@
 // Specialisation constants of every kernel file, typed. One function each makes the text that the build checks and the cache is keyed by.
+//
+// A technique's kernel file includes receivers.cl and occluders.cl, and launches all it needs from its own program: drivers take tens of
+// milliseconds a program even from their caches. Those two files are programs of their own as well, where no technique is at work.
 #pragma once
 
 #include <vector>
@@ -21,6 +24,7 @@ struct OccludersConstants {
 };
 
 struct ShadowMapConstants {
+    int rows = tile_rows;
     opencl::Specialisation specialisation() const;
 };
 

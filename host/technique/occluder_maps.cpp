@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "technique/constants.hpp"
-
 namespace penumbra {
 namespace {
 
@@ -42,13 +40,13 @@ OccluderView occluder_view(const OccluderDepth& depth, MapSize size)
             .edge_on_y = 0.5f / (scale_y * texel_y)};
 }
 
-OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision)
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision,
+                         const opencl::Specialisation& program)
 {
     const std::size_t count = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
     const std::size_t source = static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height);
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)};
     const cl_int2 from_size{{from.width, from.height}}, to_size{{size.width, size.height}};
-    const opencl::Specialisation program = OccludersConstants{}.specialisation();
 
     OccluderMap map{.texels = work.buffer<cl_float2>(count, "occluder texels"), .steps = work.buffer<cl_float2>(count, "occluder slopes")};
     if (from.width == size.width && from.height == size.height)

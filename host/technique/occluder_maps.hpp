@@ -7,6 +7,7 @@
 #include "opencl/work.hpp"
 #include "scene/camera.hpp"
 #include "scene/light_space.hpp"
+#include "technique/constants.hpp"
 
 namespace penumbra {
 
@@ -36,6 +37,8 @@ MapSize reduced_size(int width, int height, int resolution);
 OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
 
 // Disparity and covered share at `size`, and the surface's steps; depths are right to the relative `precision`.
-OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision);
+// `program`: one that has the kernels.
+OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision,
+                         const opencl::Specialisation& program = OccludersConstants{}.specialisation());
 
 } // namespace penumbra

@@ -1,7 +1,5 @@
 #include "technique/receiver_points.hpp"
 
-#include "technique/constants.hpp"
-
 namespace penumbra {
 namespace {
 
@@ -39,7 +37,8 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
     return view;
 }
 
-ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision)
+ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
+                               const opencl::Specialisation& program)
 {
     const std::size_t count = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.rows);
     ReceiverPoints points{.view = view,
@@ -47,9 +46,8 @@ ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, con
                           .xi = work.buffer<float>(count, "receivers' xi"),
                           .eta = work.buffer<float>(count, "receivers' eta"),
                           .d = work.buffer<float>(count, "receivers' disparity")};
-    work.launch(ReceiversConstants{}.specialisation(), "receivers_from_depth",
-                {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8}, count * 16, view, depth, points.xi,
-                points.eta, points.d);
+    work.launch(program, "receivers_from_depth", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
+                count * 16, view, depth, points.xi, points.eta, points.d);
     return points;
 }
 

@@ -5,6 +5,7 @@
 
 #include "common/shared.h"
 #include "opencl/work.hpp"
+#include "technique/constants.hpp"
 
 namespace penumbra {
 
@@ -18,7 +19,8 @@ struct ReceiverPoints {
 // The transform from `camera` to the space of the light's own view.
 ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view);
 
-// Launches receivers_from_depth on a depth map that is on the device.
-ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision);
+// Launches receivers_from_depth on a depth map that is on the device. `program`: one that has the kernel.
+ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
+                               const opencl::Specialisation& program = ReceiversConstants{}.specialisation());
 
 } // namespace penumbra

@@ -28,10 +28,12 @@ TechniqueRow shadow_map_row()
 PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& depth, const ShadowMap& settings)
 {
     const MapSize size{depth.width, depth.height};
+    const opencl::Specialisation program = ShadowMapConstants{}.specialisation();
     return {.settings = settings,
+            .program = program,
             .view = occluder_view(depth, size),
             .precision = depth.precision,
-            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision)};
+            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program)};
 }
 
 void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility)
@@ -41,7 +43,7 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
     const std::uint64_t bytes = grid[0] * grid[1] * 20;
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
-    const opencl::Specialisation program = ShadowMapConstants{}.specialisation();
+    const opencl::Specialisation& program = prepared.program;
     if (prepared.settings.filter == ShadowFilter::bicubic) {
         work.launch(program, "shadow_map_bicubic", grid, {16, 8}, bytes, view, prepared.view, bias, precision, prepared.map.texels,
                     prepared.map.steps, receivers.xi, receivers.eta, receivers.d, visibility);

@@ -8,6 +8,7 @@ namespace penumbra {
 
 struct PreparedShadowMap {
     ShadowMap settings;
+    opencl::Specialisation program;
     OccluderView view{};
     double precision = 0;
     OccluderMap map;

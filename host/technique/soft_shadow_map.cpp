@@ -15,24 +15,24 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
 
-PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction,
-                                         double precision)
+PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
+                                         MapSize size)
 {
     const MapSize blocks = blocks_of(size), superblocks = blocks_of(blocks);
-    PreparedSoftShadowMap::Side side{.map = occluder_map(work, depth, from, size, reduction, precision),
-                                     .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
-                                     .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
-    const opencl::Specialisation program = OccludersConstants{}.specialisation();
-    work.launch(program, "nearest_of_texels", grid_of(blocks), {16, 4}, count_of(size) * 8, cl_int2{{size.width, size.height}},
+    PreparedSoftShadowMap::Side side{
+        .map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program),
+        .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
+        .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
+    work.launch(prepared.program, "nearest_of_texels", grid_of(blocks), {16, 4}, count_of(size) * 8, cl_int2{{size.width, size.height}},
                 side.map.texels, cl_int2{{blocks.width, blocks.height}}, side.blocks);
-    work.launch(program, "nearest_of_blocks", grid_of(superblocks), {16, 4}, count_of(blocks) * 4, cl_int2{{blocks.width, blocks.height}},
-                side.blocks, cl_int2{{superblocks.width, superblocks.height}}, side.superblocks);
+    work.launch(prepared.program, "nearest_of_blocks", grid_of(superblocks), {16, 4}, count_of(blocks) * 4,
+                cl_int2{{blocks.width, blocks.height}}, side.blocks, cl_int2{{superblocks.width, superblocks.height}}, side.superblocks);
     return side;
 }
 
-SoftShadowMapConstants constants_of(const opencl::Work& work, const SoftShadowMap& settings)
+SoftShadowMapConstants constants_of(const opencl::Context& context, const SoftShadowMap& settings)
 {
-    const int lanes = work.context().quirks().lanes;
+    const int lanes = context.quirks().lanes;
     return {.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = static_cast<int>(settings.accumulator)};
 }
 
@@ -41,7 +41,7 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
                 const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility,
                 const opencl::Buffer<cl_uint>& evaluated)
 {
-    const SoftShadowMapConstants constants = constants_of(work, prepared.settings);
+    const SoftShadowMapConstants constants = constants_of(work.context(), prepared.settings);
     const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
@@ -51,7 +51,7 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
     const std::array<std::size_t, 2> group =
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
     const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
-    work.launch(constants.specialisation(), "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
+    work.launch(prepared.program, "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, side.map.texels, side.map.steps, side.blocks,
                 side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, visibility, evaluated);
 }
@@ -84,16 +84,23 @@ TechniqueRow soft_shadow_map_row()
             .defaults = SoftShadowMap{}};
 }
 
+opencl::Specialisation program_of(const opencl::Context& context, const SoftShadowMap& settings)
+{
+    return constants_of(context, settings).specialisation();
+}
+
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
 {
     const MapSize from{depth.width, depth.height};
     const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
-    PreparedSoftShadowMap prepared{
-        .settings = settings, .view = occluder_view(depth, size), .precision = depth.precision, .nearest = 0, .sides = {}};
-    if (settings.sides != Sides::back)
-        prepared.sides.push_back(prepare_side(work, depth.front, from, size, settings.reduction, depth.precision));
-    if (settings.sides != Sides::front)
-        prepared.sides.push_back(prepare_side(work, depth.back, from, size, settings.reduction, depth.precision));
+    PreparedSoftShadowMap prepared{.settings = settings,
+                                   .program = program_of(work.context(), settings),
+                                   .view = occluder_view(depth, size),
+                                   .precision = depth.precision,
+                                   .nearest = 0,
+                                   .sides = {}};
+    if (settings.sides != Sides::back) prepared.sides.push_back(prepare_side(work, prepared, depth.front, from, size));
+    if (settings.sides != Sides::front) prepared.sides.push_back(prepare_side(work, prepared, depth.back, from, size));
 
     for (const auto& side : prepared.sides)
         for (const float d : work.read(side.superblocks)) prepared.nearest = std::max(prepared.nearest, d);
@@ -109,8 +116,8 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
     const auto evaluated = work.buffer<cl_uint>(tiles_x * tiles_y, "evaluated texels");
     const cl_float2 half_inverse_scale{{0.5f / prepared.view.light_scale_x, 0.5f / prepared.view.light_scale_y}};
 
-    work.launch(ReceiversConstants{}.specialisation(), "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view,
-                prepared.nearest, half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
+    work.launch(prepared.program, "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view, prepared.nearest,
+                half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
     for (std::size_t i = 0; i < prepared.sides.size(); ++i)
         shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
@@ -123,12 +130,12 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
 }
 
 void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::Buffer& mask, int mask_width, int mask_height,
-                 const cl::Buffer& visibility)
+                 const cl::Buffer& visibility, const opencl::Specialisation& program)
 {
     const ReceiverView& view = receivers.view;
     const auto width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height);
-    work.launch(ReceiversConstants{}.specialisation(), "sample_mask", {width, height}, {16, 8}, width * height * 20, view, receivers.xi,
-                receivers.eta, receivers.d, cl_int2{{mask_width, mask_height}}, mask, visibility);
+    work.launch(program, "sample_mask", {width, height}, {16, 8}, width * height * 20, view, receivers.xi, receivers.eta, receivers.d,
+                cl_int2{{mask_width, mask_height}}, mask, visibility);
 }
 
 } // namespace penumbra

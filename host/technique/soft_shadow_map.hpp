@@ -15,6 +15,7 @@ struct PreparedSoftShadowMap {
         opencl::Buffer<float> blocks, superblocks;
     };
     SoftShadowMap settings;
+    opencl::Specialisation program;
     OccluderView view{};
     double precision = 0;
     float nearest = 0; // greatest disparity of any side; 0: nothing casts
@@ -28,6 +29,9 @@ struct ShadeCounts {
     std::uint64_t uncovered_receivers = 0; // that see part of the light past the occluder map's border
 };
 
+// The program with every kernel that the technique launches on this device.
+opencl::Specialisation program_of(const opencl::Context& context, const SoftShadowMap& settings);
+
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings);
 
 // Writes visibility, receivers.view.height x receivers.view.width. With `counts` it waits for the device to fill them in.
@@ -36,6 +40,6 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
 
 // A mask of the light's view, sampled at receivers of another camera (the `project` setting).
 void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::Buffer& mask, int mask_width, int mask_height,
-                 const cl::Buffer& visibility);
+                 const cl::Buffer& visibility, const opencl::Specialisation& program = ReceiversConstants{}.specialisation());
 
 } // namespace penumbra
