@@ -73,8 +73,19 @@ CameraSpec explicit_spec(const CameraSpec& spec, const Camera& camera)
     return LightCamera{.tan_half_fov = camera.half_extent, .half_extent = {}, .center = {}};
 }
 
+void check_pixels(int width, int height, std::string_view where)
+{
+    // As for images that are read. Kernels count pixels in an int: rows padded to a multiple of 16 and columns to the tile's rows stay
+    // below 2^31.
+    constexpr std::int64_t limit = std::int64_t{1} << 30;
+    if (width > 65536 || height > 65536 || std::int64_t{width} * height > limit)
+        throw Error(ErrorCode::too_large, std::string(where) + ": is " + std::to_string(width) + " x " + std::to_string(height),
+                    "expected at most 65536 each way and " + std::to_string(limit) + " pixels");
+}
+
 void check_size(const DepthMap& map, int width, int height, std::string_view where)
 {
+    check_pixels(width, height, where);
     const std::size_t count = static_cast<std::size_t>(std::max(width, 0)) * static_cast<std::size_t>(std::max(height, 0));
     if (width < 1 || height < 1 || map.width != width || map.height != height || map.depth.size() != count)
         throw Error(ErrorCode::invalid_input,
@@ -87,6 +98,7 @@ Occluders occluders_with_depth(const Scene& scene, const DepthNeeds& needs)
 {
     Occluders occluders = scene.occluders;
     if (!needs.front && !needs.back) return occluders;
+    check_pixels(occluders.width, occluders.height, "occluders.resolution");
 
     const bool render_front = needs.front && !occluders.front, render_back = needs.back && !occluders.back;
     if (render_front && !any(scene, &Object::casts)) missing("occluders.depth.front", "cast");
@@ -106,6 +118,7 @@ Occluders occluders_with_depth(const Scene& scene, const DepthNeeds& needs)
 Receivers receivers_with_depth(const Scene& scene)
 {
     Receivers receivers = scene.receivers;
+    check_pixels(receivers.width, receivers.height, "receivers.resolution");
     const Camera camera =
         resolve_camera(receivers.camera, scene.light, scene.objects, receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {

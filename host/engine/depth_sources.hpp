@@ -27,6 +27,9 @@ std::shared_ptr<const Tracer> receivers_of(const Scene& scene);
 Occluders occluders_with_depth(const Scene& scene, const DepthNeeds& needs);
 Receivers receivers_with_depth(const Scene& scene);
 
+// Throws too_large for more pixels than any map may have, before memory is taken for them.
+void check_pixels(int width, int height, std::string_view where);
+
 // Throws invalid_input unless the map has `width` x `height` depths. `where` is its key.
 void check_size(const DepthMap& map, int width, int height, std::string_view where);
 

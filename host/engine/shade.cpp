@@ -69,6 +69,7 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
     const auto* soft = std::get_if<SoftShadowMap>(&state.technique);
     const int light_resolution = soft && soft->project ? soft->project_resolution : 0;
 
+    check_pixels(light_resolution, light_resolution, "technique.project_resolution");
     DepthMap from_light;
     if (light_resolution > 0) {
         const Stopwatch render;

@@ -46,6 +46,27 @@ TEST(EngineErrors, SizesThatDoNotFit)
     expect_error(error_of([&] { engine().shade(prepared, r); }), ErrorCode::invalid_input, {"receivers.depth: is missing"});
 }
 
+// 65536 x 65536 would take 16 GiB a map, and its pixels would not count in a kernel's int: refused before anything is rendered.
+TEST(EngineErrors, MapsOfMorePixelsThanAnyMapMayHave)
+{
+    TriangleMesh triangle{.positions = {{-1, -1, -2}, {1, -1, -2}, {0, 1, -2}}, .triangles = {{0, 1, 2}}};
+    Scene scene;
+    scene.light = rectangle_light(1, 1);
+    scene.objects = {Object{.name = "triangle", .mesh = triangle}};
+    scene.occluders.camera = scene.receivers.camera = light_view();
+    scene.receivers.width = scene.receivers.height = 65536;
+    for (const Technique& technique : {Technique(front), Technique(ShadowMap{}), Technique(RayTraced{})})
+        expect_error(error_of([&] { engine().mask(scene, technique); }), ErrorCode::too_large,
+                     {"receivers.resolution", "65536 x 65536", "1073741824"});
+    scene.occluders.width = scene.occluders.height = 65536;
+    expect_error(error_of([&] { engine().prepare(scene, front); }), ErrorCode::too_large, {"occluders.resolution"});
+
+    const Prepared prepared = engine().prepare(rectangle_light(1, 1), occluders(light_view(), flat(8, 8, 2)),
+                                               SoftShadowMap{.sides = Sides::front, .project = true, .project_resolution = 65536});
+    expect_error(error_of([&] { engine().shade(prepared, receivers(light_view(), flat(8, 8, 4))); }), ErrorCode::too_large,
+                 {"technique.project_resolution"});
+}
+
 TEST(EngineErrors, MissingMapsAreNamed)
 {
     const Occluders o = occluders(light_view(), flat(8, 8, 2));
