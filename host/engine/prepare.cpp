@@ -38,13 +38,15 @@ std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::C
     return state;
 }
 
+constexpr const char* empty_map = "the occluder map is empty: nothing casts shadows";
+
 // Runs the technique's prepare step on depth that is on the device.
 void prepare_maps(opencl::Work& work, const OccluderDepth& depth, Prepared::State& state)
 {
     work.stage("prepare");
     if (const auto* settings = std::get_if<SoftShadowMap>(&state.technique)) {
         auto prepared = prepare_soft_shadow_map(work, depth, *settings);
-        if (prepared.nearest == 0) state.warnings.push_back("the occluder map is empty: nothing casts shadows");
+        if (prepared.nearest == 0) state.warnings.push_back(empty_map);
         state.data = std::move(prepared);
     } else {
         state.data = prepare_shadow_map(work, depth, std::get<ShadowMap>(state.technique));
@@ -109,6 +111,10 @@ std::shared_ptr<Prepared::State> prepare_from_maps(const std::shared_ptr<const o
     if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
     if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");
     state->light_view = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height);
+
+    const auto there = [](float depth) { return depth > 0 && std::isfinite(depth); };
+    if (std::holds_alternative<ShadowMap>(technique) && std::none_of(occluders.front->depth.begin(), occluders.front->depth.end(), there))
+        state->warnings.push_back(empty_map);
 
     opencl::Work work(context);
     std::vector<opencl::Buffer<float>> maps;
