@@ -1,0 +1,65 @@
+// One connection, one request: the stream that the HTTP library reads and writes, with limits of our own.
+//
+// Debian's cpp-httplib 0.11.4 limits neither the number of header lines nor their bytes, times each recv instead of the request, gives no
+// answer to a client that closed its sending side, and closes sockets with unread data, so that the answer to a refused upload is lost.
+// This stream does all of that right; only the library's parser of request line and headers is used.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include <httplib.h>
+
+#include "gate.hpp"
+
+namespace penumbra::server {
+
+constexpr std::size_t max_header_bytes = 16384; // request line and headers together
+
+class Connection final : public httplib::Stream {
+public:
+    // Takes the socket, and closes it when it goes.
+    Connection(socket_t socket, Deadline headers, Deadline request);
+    ~Connection() override;
+    Connection(const Connection&) = delete;
+    Connection& operator=(const Connection&) = delete;
+
+    // The one that this thread serves.
+    static Connection& current();
+
+    bool is_readable() const override { return true; }
+    bool is_writable() const override { return true; }
+    ssize_t read(char* to, size_t size) override;
+    ssize_t write(const char* from, size_t size) override;
+    void get_remote_ip_and_port(std::string& ip, int& port) const override;
+    void get_local_ip_and_port(std::string& ip, int& port) const override;
+    socket_t socket() const override { return socket_; }
+
+    // From now on bytes belong to the body, of which `expected` are to come.
+    void begin_body(std::uint64_t expected);
+    bool in_body() const { return in_body_; }
+
+    const Deadline& request() const { return request_; }
+    bool timed_out() const { return timed_out_; }
+    bool headers_too_large() const { return header_bytes_ > max_header_bytes; }
+
+    // Of the request, for its handler and its log line. `reason` and `inside`: why it was refused, for metrics and for the log alone.
+    std::string content_type, request_id, reason, inside;
+    Deadline::Clock::time_point begun = Deadline::Clock::now();
+
+private:
+    bool fill(); // the buffer from the socket; false: nothing came
+    void drain();
+
+    socket_t socket_;
+    Deadline headers_, request_;
+    bool in_body_ = false, timed_out_ = false, ended_ = false;
+    std::size_t header_bytes_ = 0;
+    std::uint64_t body_left_ = 0;
+    std::array<char, 65536> buffer_;
+    std::size_t from_ = 0, to_ = 0; // of the buffer
+};
+
+} // namespace penumbra::server

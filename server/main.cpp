@@ -1,0 +1,117 @@
+// penumbra-server: the HTTP service. Exit codes: 0 ended as asked, 1 it could not work, 2 wrong usage.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <penumbra/engine.hpp>
+#include <penumbra/error.hpp>
+
+#include "opencl/quirks.hpp"
+#include "options.hpp"
+#include "service.hpp"
+
+namespace penumbra::server {
+namespace {
+
+// A line on standard error, whole.
+void say(std::string_view line)
+{
+    static std::mutex mutex;
+    const std::scoped_lock lock(mutex);
+    std::fwrite(line.data(), 1, line.size(), stderr);
+    std::fputc('\n', stderr);
+}
+
+bool is_loopback(const std::string& host) { return host == "localhost" || host == "::1" || host.starts_with("127."); }
+
+// Waits for SIGTERM or SIGINT, which every thread has blocked; false when the time is up first.
+bool wait_for_signal(const sigset_t& signals, const timespec* time)
+{
+    for (;;) {
+        const int got = time ? sigtimedwait(&signals, nullptr, time) : sigwaitinfo(&signals, nullptr);
+        if (got > 0) return true;
+        if (time && errno == EAGAIN) return false;
+    }
+}
+
+int serve(const Options& options)
+{
+    // Blocked before any thread is made, so that all of them inherit it.
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+    opencl::prepare_environment();
+    Service service(options, options.device.empty() ? Engine() : Engine(options.device), say);
+    const int port = service.bind();
+    say("penumbra-server " + version() + "\n" + startup_text(options) + "listening on " + options.host + " port " + std::to_string(port));
+    if (!is_loopback(options.host) && options.token.empty())
+        say("warning: everybody who reaches " + options.host + " can use this service; set a token, or put it behind a proxy");
+
+    // A failure to get ready ends the service as a signal does, with another exit code.
+    std::exception_ptr failure;
+    std::jthread getting_ready([&] {
+        try {
+            service.become_ready();
+            say("ready");
+        } catch (...) {
+            failure = std::current_exception();
+            kill(getpid(), SIGTERM);
+        }
+    });
+    std::jthread answering([&] { service.serve(); });
+
+    wait_for_signal(signals, nullptr);
+    say("ending: work in flight is being finished");
+    service.drain();
+    if (options.drain_s > 0) {
+        const timespec time{options.drain_s, 0};
+        wait_for_signal(signals, &time); // a second signal shortens it
+    }
+    getting_ready.join();
+    service.stop();
+    answering.join();
+    if (failure) std::rethrow_exception(failure);
+    say("ended");
+    return 0;
+}
+
+int run(const std::vector<std::string>& arguments)
+{
+    for (const std::string& argument : arguments) {
+        std::string text;
+        if (argument == "--help" || argument == "-h") text = help_text();
+        if (argument == "--version") text = "penumbra-server " + version() + "\n";
+        if (argument == "--limits") text = limits_markdown();
+        if (text.empty()) continue;
+        if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+            throw Error(ErrorCode::output, "standard output cannot be written");
+        return 0;
+    }
+    return serve(options_from(arguments, [](const char* name) -> const char* { return std::getenv(name); }));
+}
+
+} // namespace
+} // namespace penumbra::server
+
+int main(int argc, char** argv)
+{
+    using namespace penumbra;
+    try {
+        return server::run({argv + 1, argv + argc});
+    } catch (const Error& error) {
+        server::say("penumbra-server: " + std::string(error.what()));
+        return exit_code(error.code());
+    } catch (const std::exception& error) {
+        server::say("penumbra-server: " + std::string(error.what()));
+        return 1;
+    }
+}

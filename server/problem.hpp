@@ -1,0 +1,34 @@
+// Errors as the caller of the service sees them: application/problem+json (RFC 9457).
+#pragma once
+
+#include <exception>
+#include <string>
+#include <string_view>
+
+#include <penumbra/error.hpp>
+
+namespace penumbra::server {
+
+// Thrown by whatever refuses a request. `reason` is a label of few values, for metrics; `detail` names the part or key and what was
+// expected.
+struct Problem : std::exception {
+    Problem(int status_, std::string reason_, std::string detail_, int retry_after_s_ = 0);
+
+    int status;
+    std::string reason, detail;
+    int retry_after_s; // 0: trying again does not help
+    const char* what() const noexcept override { return detail.c_str(); }
+};
+
+// The library's error; what is inside of us (device, output, internal) gets an outside text. `error.what()` belongs into the log.
+Problem problem_from(const Error& error);
+
+// Any other exception: its text says nothing to the outside.
+Problem defect();
+
+std::string_view title_of(int status);
+std::string json_of(const Problem& problem, std::string_view request_id);
+
+constexpr const char* problem_type = "application/problem+json";
+
+} // namespace penumbra::server
