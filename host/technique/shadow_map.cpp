@@ -20,7 +20,7 @@ TechniqueRow shadow_map_row()
                      real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
                                  "self-shadow bound from the surface's slope; 1 is the bound, 0 none")},
             .lights = {"rectangle", "sphere", "point", "directional"},
-            .textured_lights = true,
+            .textured_lights = false,
             .inputs = "occluder depth (front) from the light's centre (or objects that cast); receiver depth (or objects)",
             .defaults = ShadowMap{}};
 }

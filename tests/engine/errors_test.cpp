@@ -98,6 +98,7 @@ TEST(EngineErrors, LightsThatATechniqueCannotTake)
     RectangleLight textured = rectangle_light(1, 1);
     textured.emission = Image{.width = 1, .height = 1, .channels = 1, .pixels = {1}};
     expect_error(prepare_error(textured, o, front), ErrorCode::unsupported, {"light.emission", "soft_shadow_map"});
+    expect_error(prepare_error(textured, o, ShadowMap{}), ErrorCode::unsupported, {"light.emission", "shadow_map", "ray_traced"});
     expect_error(prepare_error(RectangleLight{.center = {0, 0, 0}, .half_u = {1, 0, 0}, .half_v = {1, 1, 0}, .emission = {}}, o, front),
                  ErrorCode::invalid_input, {"light.half_v"});
 
