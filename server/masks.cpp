@@ -8,7 +8,7 @@
 
 #include <penumbra/error.hpp>
 
-#include "engine/depth_sources.hpp"
+#include "engine/geometry.hpp"
 #include "engine/state.hpp"
 #include "io/scene_file.hpp"
 #include "problem.hpp"
@@ -151,13 +151,13 @@ Scene decode(std::span<const Part> parts, const Options& options, const Deadline
 // Engine::mask step by step, so that the deadline can be looked at between steps.
 Mask mask_before(const Engine& engine, const Scene& scene, const Deadline& deadline)
 {
-    const Technique technique = technique_from(scene.technique);
+    const Geometry geometry = view_of(scene);
     deadline.check("preparing");
-    const Prepared prepared = engine.prepare(scene, technique);
+    const Prepared prepared = engine.prepare(scene.light, scene.occluders, geometry, technique_from(scene.technique));
 
     deadline.check("the receivers' depth");
     const Stopwatch watch;
-    const Receivers receivers = receivers_with_depth(scene);
+    const Receivers receivers = with_depth(scene.receivers, scene.light, geometry);
     std::vector<Stage> stages{{"render depth", watch.ms(), 0, 0}};
 
     deadline.check("shading");

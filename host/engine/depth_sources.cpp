@@ -5,21 +5,11 @@
 
 #include <penumbra/error.hpp>
 
+#include "engine/geometry.hpp"
+#include "scene/light_space.hpp"
+
 namespace penumbra {
 namespace {
-
-std::shared_ptr<const Tracer> tracer_of(const Scene& scene, bool Object::*role)
-{
-    std::vector<const TriangleMesh*> meshes;
-    for (const Object& object : scene.objects)
-        if (object.*role) meshes.push_back(&object.mesh);
-    return std::make_shared<const Tracer>(meshes, light_frame(scene.light).origin);
-}
-
-bool any(const Scene& scene, bool Object::*role)
-{
-    return std::any_of(scene.objects.begin(), scene.objects.end(), [role](const Object& object) { return object.*role; });
-}
 
 [[noreturn]] void missing(const char* key, const char* role, const std::string& hint = {})
 {
@@ -62,10 +52,6 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
     return light_camera(frame, camera.half_extent, frame.origin);
 }
 
-std::shared_ptr<const Tracer> casters_of(const Scene& scene) { return tracer_of(scene, &Object::casts); }
-
-std::shared_ptr<const Tracer> receivers_of(const Scene& scene) { return tracer_of(scene, &Object::receives); }
-
 CameraSpec explicit_spec(const CameraSpec& spec, const Camera& camera)
 {
     if (std::holds_alternative<PinholeCamera>(spec)) return PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent};
@@ -94,36 +80,34 @@ void check_size(const DepthMap& map, int width, int height, std::string_view whe
                     "expected " + std::to_string(width) + " x " + std::to_string(height));
 }
 
-Occluders occluders_with_depth(const Scene& scene, const DepthNeeds& needs)
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const DepthNeeds& needs)
 {
-    Occluders occluders = scene.occluders;
+    Occluders occluders = given;
     if (!needs.front && !needs.back) return occluders;
     check_pixels(occluders.width, occluders.height, "occluders.resolution");
 
+    const bool casters = geometry.state().any(&Object::casts);
     const bool render_front = needs.front && !occluders.front, render_back = needs.back && !occluders.back;
-    if (render_front && !any(scene, &Object::casts)) missing("occluders.depth.front", "cast");
-    if (render_back && !any(scene, &Object::casts)) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
-    const Camera camera = occluder_camera(scene.light, occluders.camera, scene.objects, occluders.width, occluders.height);
-    if (render_front || render_back) {
-        const auto tracer = casters_of(scene);
-        if (render_front) occluders.front = tracer->front(camera, occluders.width, occluders.height);
-        if (render_back) occluders.back = tracer->back(camera, occluders.width, occluders.height);
-    }
+    if (render_front && !casters) missing("occluders.depth.front", "cast");
+    if (render_back && !casters) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
+    const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height);
+    if (render_front) occluders.front = geometry.state().casters()->front(camera, occluders.width, occluders.height);
+    if (render_back) occluders.back = geometry.state().casters()->back(camera, occluders.width, occluders.height);
     if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
     if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");
     occluders.camera = explicit_spec(LightCamera{}, camera);
     return occluders;
 }
 
-Receivers receivers_with_depth(const Scene& scene)
+Receivers with_depth(const Receivers& given, const Light& light, const Geometry& geometry)
 {
-    Receivers receivers = scene.receivers;
+    Receivers receivers = given;
     check_pixels(receivers.width, receivers.height, "receivers.resolution");
     const Camera camera =
-        resolve_camera(receivers.camera, scene.light, scene.objects, receivers.width, receivers.height, "receivers.camera");
+        resolve_camera(receivers.camera, light, geometry.objects(), receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {
-        if (!any(scene, &Object::receives)) missing("receivers.depth", "receive");
-        receivers.depth = receivers_of(scene)->front(camera, receivers.width, receivers.height);
+        if (!geometry.state().any(&Object::receives)) missing("receivers.depth", "receive");
+        receivers.depth = geometry.state().receivers()->front(camera, receivers.width, receivers.height);
     }
     check_size(*receivers.depth, receivers.width, receivers.height, "receivers.depth");
     receivers.camera = explicit_spec(receivers.camera, camera);
@@ -132,9 +116,10 @@ Receivers receivers_with_depth(const Scene& scene)
 
 Scene with_depth(const Scene& scene, const Technique& technique)
 {
+    const Geometry geometry = view_of(scene);
     Scene result = scene;
-    result.occluders = occluders_with_depth(scene, needs_of(technique));
-    result.receivers = receivers_with_depth(scene);
+    result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique));
+    result.receivers = with_depth(scene.receivers, scene.light, geometry);
     return result;
 }
 

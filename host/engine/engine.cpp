@@ -3,6 +3,7 @@
 #include <penumbra/error.hpp>
 
 #include "engine/depth_sources.hpp"
+#include "engine/geometry.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
 
@@ -22,10 +23,11 @@ Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(
 Mask Engine::mask(const Scene& scene, const Technique& technique) const
 {
     const Stopwatch total;
-    const Prepared prepared = prepare(scene, technique);
+    const Geometry geometry = view_of(scene);
+    const Prepared prepared = prepare(scene.light, scene.occluders, geometry, technique);
 
     const Stopwatch render;
-    const Receivers receivers = receivers_with_depth(scene);
+    const Receivers receivers = with_depth(scene.receivers, scene.light, geometry);
     const Stage rendered{"render depth", render.ms(), 0, 0};
 
     Mask mask = shade(prepared, receivers);

@@ -4,6 +4,7 @@
 #include <penumbra/error.hpp>
 
 #include "engine/depth_sources.hpp"
+#include "engine/geometry.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
 #include "technique/table.hpp"
@@ -57,17 +58,29 @@ void prepare_maps(opencl::Work& work, const OccluderDepth& depth, Prepared::Stat
     state.memory = work.memory_ptr();
 }
 
+bool inside_view(const Projected& p) { return p.depth > 0 && std::abs(p.x_px - 1) <= 1 && std::abs(p.y_px - 1) <= 1; }
+
+// Whether a box lies before the light's plane and inside its view: both are convex, so its corners decide.
+bool inside_view(const Imath::Box3d& box, const Camera& view)
+{
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 point(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y, corner & 4 ? box.max.z : box.min.z);
+        if (!inside_view(project(view, 2, 2, point))) return false;
+    }
+    return true;
+}
+
 // Whether every triangle before the light's plane lies inside the light's view.
 bool casters_inside(const std::vector<Object>& objects, const Camera& view)
 {
     for (const Object& object : objects) {
-        if (!object.casts) continue;
+        if (!object.casts || inside_view(bounds(object.mesh), view)) continue;
         for (const auto& triangle : object.mesh.triangles) {
             int before = 0, inside = 0;
             for (const std::uint32_t vertex : triangle) {
                 const Projected p = project(view, 2, 2, Vec3(object.mesh.positions[vertex]));
                 before += p.depth > 0;
-                inside += p.depth > 0 && std::abs(p.x_px - 1) <= 1 && std::abs(p.y_px - 1) <= 1;
+                inside += inside_view(p);
             }
             if (before > 0 && inside < 3) return false;
         }
@@ -123,6 +136,22 @@ std::shared_ptr<Prepared::State> prepare_from_maps(const std::shared_ptr<const o
     return state;
 }
 
+std::shared_ptr<Prepared::State> prepare_from_objects(std::shared_ptr<Prepared::State> state, const Geometry& geometry,
+                                                      const RayTraced& settings)
+{
+    if (!geometry.state().any(&Object::casts))
+        throw Error(ErrorCode::invalid_input, "objects: ray_traced needs objects that cast, and there are none",
+                    "expected meshes, quads, or a camera's depth as an object");
+    const Stopwatch watch;
+    PreparedRays rays{.settings = settings, .light = state->light, .casters = geometry.state().casters()};
+    state->prepare_ms = watch.ms();
+    state->stages.push_back({"prepare", state->prepare_ms, 0, rays.casters->bytes()});
+    if (rays.casters->degenerate_count() > 0)
+        state->warnings.push_back(std::to_string(rays.casters->degenerate_count()) + " triangles without area were left out");
+    state->data = std::move(rays);
+    return state;
+}
+
 } // namespace
 
 void check_light(const Light& light, const Technique& technique)
@@ -170,32 +199,24 @@ Prepared Engine::prepare(const Light& light, const Occluders& occluders, const T
 
 Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 {
-    if (const auto* settings = std::get_if<RayTraced>(&technique)) {
-        if (std::none_of(scene.objects.begin(), scene.objects.end(), [](const Object& object) { return object.casts; }))
-            throw Error(ErrorCode::invalid_input, "objects: ray_traced needs objects that cast, and there are none",
-                        "expected meshes, quads, or a camera's depth as an object");
-        auto state = new_state(impl_->context, scene.light, technique);
-        const Stopwatch watch;
-        PreparedRays rays = prepare_rays(scene, *settings);
-        state->prepare_ms = watch.ms();
-        state->stages.push_back({"prepare", state->prepare_ms, 0, rays.casters->bytes()});
-        if (rays.casters->degenerate_count() > 0)
-            state->warnings.push_back(std::to_string(rays.casters->degenerate_count()) + " triangles without area were left out");
-        state->data = std::move(rays);
-        return Prepared(state);
-    }
+    return prepare(scene.light, scene.occluders, view_of(scene), technique);
+}
 
-    validate(scene.light);
-    check_light(scene.light, technique);
+Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique) const
+{
+    if (const auto* settings = std::get_if<RayTraced>(&technique))
+        return Prepared(prepare_from_objects(new_state(impl_->context, light, technique), geometry, *settings));
+
+    validate(light);
+    check_light(light, technique);
     const Stopwatch watch;
-    const Occluders occluders = occluders_with_depth(scene, needs_of(technique));
+    const Occluders occluders = occluders_with_depth(light, given, geometry, needs_of(technique));
     const Stage render{"render depth", watch.ms(), 0, 0};
-    auto state = prepare_from_maps(impl_->context, scene.light, occluders, scene.objects, technique);
+    auto state = prepare_from_maps(impl_->context, light, occluders, geometry.objects(), technique);
     state->stages.insert(state->stages.begin(), render);
-    state->covered = !scene.objects.empty() && casters_inside(scene.objects, state->light_view);
+    state->covered = !geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view);
     const auto* soft = std::get_if<SoftShadowMap>(&technique);
-    if (soft && soft->project && std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.receives; }))
-        state->receiver_tracer = receivers_of(scene);
+    if (soft && soft->project && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
     return Prepared(state);
 }
 

@@ -1,7 +1,5 @@
 #include "technique/ray_traced.hpp"
 
-#include <vector>
-
 #include "technique/keys.hpp"
 #include "technique/rows.hpp"
 
@@ -22,15 +20,6 @@ TechniqueRow ray_traced_row()
             .textured_lights = true,
             .inputs = "objects that cast; receiver depth (or objects that receive)",
             .defaults = RayTraced{}};
-}
-
-PreparedRays prepare_rays(const Scene& scene, const RayTraced& settings)
-{
-    std::vector<const TriangleMesh*> casters;
-    for (const Object& object : scene.objects)
-        if (object.casts) casters.push_back(&object.mesh);
-    return {
-        .settings = settings, .light = scene.light, .casters = std::make_shared<const Tracer>(casters, light_frame(scene.light).origin)};
 }
 
 VisibilityResult shade_rays(const PreparedRays& prepared, const DepthMap& receivers, const Camera& camera)

@@ -15,8 +15,6 @@ struct PreparedRays {
     std::shared_ptr<const Tracer> casters;
 };
 
-PreparedRays prepare_rays(const Scene& scene, const RayTraced& settings);
-
 VisibilityResult shade_rays(const PreparedRays& prepared, const DepthMap& receivers, const Camera& camera);
 
 } // namespace penumbra

@@ -72,6 +72,25 @@ private:
     std::shared_ptr<const State> state_;
 };
 
+// The objects of a scene with the hierarchies that rays need, built when first asked for: for many lights, receivers or techniques over the
+// same objects. Cheap to copy; safe to use from several threads at once.
+class PENUMBRA_API Geometry {
+public:
+    // Hierarchies are kept in float32 relative to `near`, best the light's centre: what they say of a point is off by about 2^-24 of its
+    // distance from there.
+    explicit Geometry(std::vector<Object> objects, const Vec3& near = {0, 0, 0});
+
+    const std::vector<Object>& objects() const;
+    std::uint64_t bytes() const; // of triangles and of the hierarchies that were built so far
+
+    struct State;
+    explicit Geometry(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+    const State& state() const { return *state_; }
+
+private:
+    std::shared_ptr<const State> state_;
+};
+
 // Receivers whose planar depth is already on the device: float32, row-major, width * height, +infinity or 0 where nothing is there.
 struct DeviceReceivers {
     CameraSpec camera = LightCamera{};
@@ -103,9 +122,11 @@ public:
     Mask mask(const Scene& scene) const; // by scene.technique
     Mask mask(const Scene& scene, const Technique& technique) const;
 
-    // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs the second.
+    // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs objects: the second or the third.
+    // What the technique needs and `occluders` lack is rendered from the objects.
     Prepared prepare(const Light& light, const Occluders& occluders, const Technique& technique) const;
     Prepared prepare(const Scene& scene, const Technique& technique) const;
+    Prepared prepare(const Light& light, const Occluders& occluders, const Geometry& geometry, const Technique& technique) const;
     Prepared prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const;
 
     Mask shade(const Prepared& prepared, const Receivers& receivers) const;
@@ -121,6 +142,9 @@ private:
 
 // The scene with every depth image that `technique` needs in place (rendered from the objects), all cameras resolved.
 PENUMBRA_API Scene with_depth(const Scene& scene, const Technique& technique);
+
+// The receivers with their depth in place (rendered from the objects that receive where it is missing) and their camera resolved.
+PENUMBRA_API Receivers with_depth(const Receivers& receivers, const Light& light, const Geometry& geometry);
 
 // The report as the JSON of the contract (section 3).
 PENUMBRA_API std::string report_json(const Report& report);

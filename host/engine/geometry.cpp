@@ -1,0 +1,50 @@
+#include "engine/geometry.hpp"
+
+#include <algorithm>
+
+#include "scene/light_space.hpp"
+
+namespace penumbra {
+
+Geometry::Geometry(std::vector<Object> objects, const Vec3& near) : state_(std::make_shared<const State>(std::move(objects), near)) {}
+
+const std::vector<Object>& Geometry::objects() const { return *state_->objects; }
+
+std::uint64_t Geometry::bytes() const { return state_->bytes(); }
+
+Geometry view_of(const Scene& scene)
+{
+    return Geometry(std::make_shared<const Geometry::State>(&scene.objects, light_frame(scene.light).origin));
+}
+
+bool Geometry::State::any(bool Object::*role) const
+{
+    return std::any_of(objects->begin(), objects->end(), [role](const Object& object) { return object.*role; });
+}
+
+std::uint64_t Geometry::State::bytes() const
+{
+    std::uint64_t total = 0;
+    for (const Object& object : *objects)
+        total += object.mesh.positions.size() * sizeof(Imath::V3f) + object.mesh.triangles.size() * sizeof(std::array<std::uint32_t, 3>);
+    const std::lock_guard lock(building_);
+    if (casters_) total += casters_->bytes();
+    if (receivers_ && receivers_ != casters_) total += receivers_->bytes();
+    return total;
+}
+
+std::shared_ptr<const Tracer> Geometry::State::tracer(bool Object::*role, std::shared_ptr<const Tracer>& slot) const
+{
+    const std::lock_guard lock(building_);
+    if (slot) return slot;
+    const bool same = std::all_of(objects->begin(), objects->end(), [](const Object& object) { return object.casts == object.receives; });
+    if (same && casters_) return slot = casters_;
+    if (same && receivers_) return slot = receivers_;
+
+    std::vector<const TriangleMesh*> meshes;
+    for (const Object& object : *objects)
+        if (object.*role) meshes.push_back(&object.mesh);
+    return slot = std::make_shared<const Tracer>(meshes, near);
+}
+
+} // namespace penumbra
