@@ -37,14 +37,14 @@ std::string_view RequestResources::use(const std::string& name) const
     return part->bytes;
 }
 
-std::vector<std::byte> RequestResources::bytes(const std::string& name) const
+Bytes RequestResources::bytes(const std::string& name) const
 {
     const std::string_view text = use(name);
     const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
     const ImageFormat format = sniff(bytes);
     if (format == ImageFormat::unknown || format == ImageFormat::hdr)
         throw Error(ErrorCode::unsupported, "part " + in_quotes(name) + " is of no format that is taken", "expected EXR, PNG, TIFF or PFM");
-    return {bytes.begin(), bytes.end()};
+    return Bytes(bytes);
 }
 
 std::string RequestResources::path(const std::string& name) const

@@ -23,7 +23,7 @@ public:
 
     // Throws not_found (listing the parts), unsupported for anything but EXR, PNG, TIFF and PFM, too_large when the scene names more
     // than options.parts of them, each counted as often as it is named; Problem 504 when the deadline has passed.
-    std::vector<std::byte> bytes(const std::string& name) const override;
+    Bytes bytes(const std::string& name) const override;
     // A mesh, in a private temporary file that goes with this object. Throws unsupported without options.allow_meshes.
     std::string path(const std::string& name) const override;
     std::uint64_t max_samples() const override { return static_cast<std::uint64_t>(options_.image_samples); }

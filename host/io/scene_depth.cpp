@@ -89,7 +89,7 @@ CameraSpec camera_of(const JsonObject& section, const Light& light)
 
 } // namespace
 
-std::vector<std::byte> load_bytes(const JsonValue& name, const Resources& resources)
+Bytes load_bytes(const JsonValue& name, const Resources& resources)
 {
     const std::string file = name.text();
     try {

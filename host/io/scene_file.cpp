@@ -53,7 +53,7 @@ bool has_images(const Scene& scene)
 
 } // namespace
 
-std::vector<std::byte> FileResources::bytes(const std::string& name) const { return read_file(path(name), name); }
+Bytes FileResources::bytes(const std::string& name) const { return Bytes(read_file(path(name), name)); }
 
 std::string FileResources::path(const std::string& name) const { return (std::filesystem::path(folder_) / name).string(); }
 

@@ -4,20 +4,36 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <penumbra/scene.hpp>
 
 namespace penumbra {
 
+// Bytes of its own, or a view of bytes that lie elsewhere: what is in memory already is not copied to be read.
+class Bytes {
+public:
+    explicit Bytes(std::vector<std::byte> own) : own_(std::move(own)), view_(own_) {}
+    explicit Bytes(std::span<const std::byte> elsewhere) : view_(elsewhere) {}
+    Bytes(Bytes&&) = default; // a vector's bytes stay where they are when it moves
+    Bytes& operator=(Bytes&&) = default;
+    operator std::span<const std::byte>() const { return view_; }
+
+private:
+    std::vector<std::byte> own_;
+    std::span<const std::byte> view_;
+};
+
 // Where the names in a scene lead.
 class Resources {
 public:
     virtual ~Resources() = default;
-    // The bytes of what `name` stands for. Throws not_found.
-    virtual std::vector<std::byte> bytes(const std::string& name) const = 0;
+    // The bytes of what `name` stands for; a view among them is valid as long as this object. Throws not_found.
+    virtual Bytes bytes(const std::string& name) const = 0;
     // A path for readers that need files (meshes with companions); throws unsupported where there are no files.
     virtual std::string path(const std::string& name) const = 0;
     // The largest image (width * height * channels) that is decoded; larger ones are refused by their header.
@@ -28,7 +44,7 @@ public:
 class FileResources : public Resources {
 public:
     explicit FileResources(std::string folder) : folder_(std::move(folder)) {}
-    std::vector<std::byte> bytes(const std::string& name) const override;
+    Bytes bytes(const std::string& name) const override;
     std::string path(const std::string& name) const override;
 
 private:

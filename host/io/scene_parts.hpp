@@ -35,6 +35,6 @@ Receivers parse_receivers(const JsonValue& value, const Light& light, const Reso
 Object parse_object(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);
 
 // What `name` stands for; errors name the key.
-std::vector<std::byte> load_bytes(const JsonValue& name, const Resources& resources);
+Bytes load_bytes(const JsonValue& name, const Resources& resources);
 
 } // namespace penumbra

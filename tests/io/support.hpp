@@ -73,11 +73,11 @@ public:
     std::map<std::string, std::vector<std::byte>> parts;
     std::uint64_t limit = std::uint64_t{1} << 24;
 
-    std::vector<std::byte> bytes(const std::string& name) const override
+    Bytes bytes(const std::string& name) const override
     {
         const auto found = parts.find(name);
         if (found == parts.end()) throw Error(ErrorCode::not_found, name + ": no such part");
-        return found->second;
+        return Bytes(std::span(found->second));
     }
     std::string path(const std::string& name) const override { throw Error(ErrorCode::unsupported, name + ": meshes are not taken here"); }
     std::uint64_t max_samples() const override { return limit; }

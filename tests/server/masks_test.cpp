@@ -13,13 +13,10 @@ namespace {
 class PartResources final : public Resources {
 public:
     explicit PartResources(Parts all) : all_(std::move(all)) {}
-    std::vector<std::byte> bytes(const std::string& name) const override
+    Bytes bytes(const std::string& name) const override
     {
         for (const auto& [known, text] : all_)
-            if (known == name) {
-                const auto* data = reinterpret_cast<const std::byte*>(text.data());
-                return {data, data + text.size()};
-            }
+            if (known == name) return Bytes(std::as_bytes(std::span(text)));
         throw Error(ErrorCode::not_found, name);
     }
     std::string path(const std::string& name) const override { throw Error(ErrorCode::unsupported, name); }
