@@ -1,0 +1,166 @@
+// @ts-check
+// The service over HTTP. A scene is kept by the service where it can, so that moving the light sends a few hundred bytes.
+
+/** @typedef {Record<string, any>} Json */
+/** @typedef {Map<string, Blob>} Files the images that a scene names */
+/** @typedef {{name: string, ms: number}} Stage */
+/** @typedef {{buffer: ArrayBuffer, stages: Stage[], warnings: string[], ms: number}} MaskReply */
+/** @typedef {{kind: string, summary: string, lights: string[], inputs: string, source: string, schema: Json}} Technique */
+
+/** The sections that differ from one request to the next of a kept scene. */
+const CHANGEABLE = ["light", "technique", "output"];
+
+/** An answer that is no success, in the service's own words. */
+export class ServiceError extends Error {
+  /** @param {number} status @param {string} detail @param {string} reason @param {number} retry_after_s */
+  constructor(status, detail, reason, retry_after_s) {
+    super(detail);
+    this.status = status;
+    this.reason = reason;
+    this.retry_after_s = retry_after_s;
+  }
+}
+
+/** @param {Response} response */
+async function error_of(response) {
+  const text = await response.text();
+  /** @type {Json} */
+  let problem = {};
+  try {
+    problem = JSON.parse(text);
+  } catch {
+    // Not the service's own answer: a proxy's page, say.
+  }
+  const detail = problem.detail ?? `the answer is ${response.status} ${response.statusText}`;
+  return new ServiceError(response.status, detail, problem.reason ?? "", Number(response.headers.get("Retry-After") ?? 0));
+}
+
+/** @param {string | null} header @returns {Stage[]} */
+export function stages_of(header) {
+  if (!header) return [];
+  return header.split(",").map((entry) => {
+    const [name, ...parameters] = entry.trim().split(";");
+    const duration = parameters.find((parameter) => parameter.trim().startsWith("dur="));
+    return { name, ms: duration ? Number(duration.trim().slice(4)) : 0 };
+  });
+}
+
+/** @param {Json} scene @param {Files} files */
+function form_of(scene, files) {
+  const form = new FormData();
+  form.append("scene", new Blob([JSON.stringify(scene)], { type: "application/json" }), "scene.json");
+  for (const [name, blob] of files) form.append(name, blob, name);
+  return form;
+}
+
+export class Client {
+  /** The bearer token; in memory only. */
+  token = "";
+  /** False once the service has said that it keeps no scenes. */
+  keeps = true;
+  /** @type {Map<string, string>} what is kept, by content */
+  #kept = new Map();
+  /** @type {WeakMap<Blob, number>} */
+  #numbers = new WeakMap();
+  #count = 0;
+
+  /** @param {string} path @param {RequestInit} [init] */
+  async #fetch(path, init = {}) {
+    const headers = new Headers(init.headers);
+    if (this.token) headers.set("Authorization", `Bearer ${this.token}`);
+    const response = await fetch(path, { ...init, headers, cache: "no-store" });
+    if (!response.ok) throw await error_of(response);
+    return response;
+  }
+
+  /** @returns {Promise<Technique[]>} */
+  async techniques() {
+    return (await (await this.#fetch("/v1/techniques")).json()).techniques;
+  }
+
+  /** The device that computes. @returns {Promise<{version: string, device: string}>} */
+  async device() {
+    const { version, devices } = await (await this.#fetch("/v1/devices")).json();
+    return { version, device: devices.find((/** @type {Json} */ d) => d.selected)?.name ?? "" };
+  }
+
+  /** The mask of a scene that more requests will follow of.
+   * @param {Json} scene @param {Files} files @param {string} accept media type */
+  mask(scene, files, accept) {
+    return this.#timed(() => this.#post_kept(scene, files, accept));
+  }
+
+  /** The mask of a scene that is asked for once.
+   * @param {Json} scene @param {Files} files @param {string} accept media type */
+  mask_once(scene, files, accept) {
+    return this.#timed(() => this.#post_whole(scene, files, accept));
+  }
+
+  /** @param {() => Promise<Response>} post @returns {Promise<MaskReply>} */
+  async #timed(post) {
+    const begun = performance.now();
+    const response = await post();
+    const buffer = await response.arrayBuffer();
+    return {
+      buffer,
+      stages: stages_of(response.headers.get("Server-Timing")),
+      warnings: JSON.parse(response.headers.get("Penumbra-Warnings") ?? "[]"),
+      ms: performance.now() - begun,
+    };
+  }
+
+  /** @param {Json} scene @param {Files} files @param {string} accept */
+  #post_whole(scene, files, accept) {
+    return this.#fetch("/v1/masks", { method: "POST", body: form_of(scene, files), headers: { Accept: accept } });
+  }
+
+  /** @param {Json} scene @param {Files} files @param {string} accept */
+  async #post_kept(scene, files, accept) {
+    const id = this.keeps ? await this.#keep(scene, files) : "";
+    if (id === "") return this.#post_whole(scene, files, accept);
+    const patch = Object.fromEntries(CHANGEABLE.filter((key) => key in scene).map((key) => [key, scene[key]]));
+    const changed = (/** @type {string} */ kept) =>
+      this.#fetch(`/v1/scenes/${kept}/masks`, {
+        method: "POST",
+        body: JSON.stringify(patch),
+        headers: { Accept: accept, "Content-Type": "application/merge-patch+json" },
+      });
+    try {
+      return await changed(id);
+    } catch (error) {
+      if (!(error instanceof ServiceError && error.status === 404)) throw error;
+      // Its time was over: send it again.
+      this.#kept.delete(this.#key(scene, files));
+      return changed(await this.#keep(scene, files));
+    }
+  }
+
+  /** The kept scene's id; empty when the service keeps none.
+   * @param {Json} scene @param {Files} files */
+  async #keep(scene, files) {
+    const key = this.#key(scene, files);
+    const known = this.#kept.get(key);
+    if (known !== undefined) return known;
+    // Without settings: a patch of the same kind of technique then begins at the defaults, as one of another kind does.
+    const base = { ...scene, technique: { kind: scene.technique.kind } };
+    try {
+      const { id } = await (await this.#fetch("/v1/scenes", { method: "POST", body: form_of(base, files) })).json();
+      this.#kept.set(key, id);
+      return /** @type {string} */ (id);
+    } catch (error) {
+      if (!(error instanceof ServiceError && (error.status === 404 || error.status === 405))) throw error;
+      this.keeps = false;
+      return "";
+    }
+  }
+
+  /** @param {Json} scene @param {Files} files */
+  #key(scene, files) {
+    const fixed = Object.entries(scene).filter(([key]) => !CHANGEABLE.includes(key));
+    const numbers = [...files].map(([name, blob]) => {
+      if (!this.#numbers.has(blob)) this.#numbers.set(blob, ++this.#count);
+      return [name, this.#numbers.get(blob)];
+    });
+    return JSON.stringify([fixed, numbers]);
+  }
+}

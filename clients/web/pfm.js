@@ -1,0 +1,44 @@
+// @ts-check
+// Portable float maps, the format in which masks come while the light moves: exact, and cheap on both sides.
+
+/** An image of float samples; row 0 is the top, channels are interleaved.
+ * @typedef {{width: number, height: number, channels: 1 | 3, pixels: Float32Array}} FloatImage */
+
+/** The header's words and the offset of the samples: one character of white space ends the last word.
+ * @param {Uint8Array} bytes @param {number} count */
+function words_of(bytes, count) {
+  const words = [];
+  let at = 0;
+  const is_space = (/** @type {number} */ code) => code === 32 || (code >= 9 && code <= 13);
+  while (words.length < count) {
+    while (at < bytes.length && is_space(bytes[at])) at++;
+    let word = "";
+    while (at < bytes.length && !is_space(bytes[at]) && word.length < 32) word += String.fromCharCode(bytes[at++]);
+    if (word === "" || at >= bytes.length || !is_space(bytes[at])) throw new Error("the float map ends in its header");
+    words.push(word);
+    at++;
+  }
+  return { words, at };
+}
+
+/** @param {ArrayBuffer} buffer @returns {FloatImage} */
+export function decode_pfm(buffer) {
+  const { words, at } = words_of(new Uint8Array(buffer), 4);
+  if (words[0] !== "Pf" && words[0] !== "PF") throw new Error(`a float map begins with Pf or PF, not "${words[0]}"`);
+  const channels = words[0] === "PF" ? 3 : 1;
+  const [width, height, scale] = words.slice(1).map(Number);
+  if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0))
+    throw new Error(`the float map has a size of ${words[1]} x ${words[2]}`);
+  if (!Number.isFinite(scale) || scale === 0) throw new Error(`the float map's scale is ${words[3]}, which must be a number other than 0`);
+  const row = width * channels;
+  const expected = row * height * 4;
+  if (buffer.byteLength - at !== expected)
+    throw new Error(`the float map has ${buffer.byteLength - at} bytes of samples; ${width} x ${height} x ${channels} takes ${expected}`);
+
+  // Rows stand bottom up; a negative scale means little-endian.
+  const view = new DataView(buffer, at);
+  const pixels = new Float32Array(row * height);
+  for (let y = 0; y < height; y++)
+    for (let i = 0; i < row; i++) pixels[(height - 1 - y) * row + i] = view.getFloat32((y * row + i) * 4, scale < 0);
+  return { width, height, channels, pixels };
+}

@@ -1,0 +1,81 @@
+// @ts-check
+// What is lit: the bundled courtyard, one camera's depth, or depth seen from a light. Each becomes a scene file.
+import { courtyard, courtyard_view } from "./courtyard.js";
+import { light_json } from "./light.js";
+
+/** @typedef {import("./vector.js").Vec3} Vec3 */
+/** @typedef {import("./light.js").Light} Light */
+/** @typedef {import("./client.js").Json} Json */
+/** @typedef {import("./client.js").Files} Files */
+/** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
+ * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
+/** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows.
+ * @typedef {{kind: string, title: string, objects: Json[], occluders: Json, receivers: Json, files: Files, room: Room, light: Light,
+ *            fixed_light: string, lights: string[], renders: boolean}} Source */
+
+const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
+
+/** @returns {Source} */
+export function courtyard_source() {
+  return {
+    kind: "courtyard", title: "Courtyard", objects: courtyard(), files: new Map(),
+    occluders: { resolution: [384, 384] }, receivers: { camera: courtyard_view, resolution: [512, 512] },
+    room: { middle: [0, 0, 0.5], reach: 8, low: 1, high: 11 },
+    light: {
+      kind: "rectangle", position: [-3.4, 6.2, 4.8], target: [0, 0.6, -0.6],
+      width: 0.9, height: 0.9, radius: 0.5, angular_diameter_deg: 4,
+    },
+    fixed_light: "", lights: EVERY_LIGHT, renders: true,
+  };
+}
+
+/** One camera's depth image, in the camera's own space: at the origin, looking along -Z. The light begins beside the camera.
+ * @param {{name: string, file: Blob, encoding: Json, vertical_fov_deg: number, distance: number}} given
+ *   `distance`: how far the middle of the picture is, in scene units
+ * @returns {Source} */
+export function camera_source({ name, file, encoding, vertical_fov_deg, distance }) {
+  const camera = { kind: "pinhole", eye: [0, 0, 0], target: [0, 0, -distance], up: [0, 1, 0], vertical_fov_deg };
+  const coded = encoding.kind === "planar" && Object.keys(encoding).length === 1 ? {} : { encoding };
+  return {
+    kind: "camera", title: name, files: new Map([[name, file]]),
+    objects: [{ depth: name, camera, ...coded }],
+    occluders: { resolution: [384, 384] }, receivers: { camera, depth: name, ...coded },
+    room: { middle: [0, 0, -distance], reach: 1.6 * distance, low: -1.5 * distance, high: 2 * distance },
+    light: {
+      kind: "rectangle", position: [-0.7 * distance, 0.8 * distance, -0.5 * distance], target: [0, 0, -distance],
+      width: 0.15 * distance, height: 0.15 * distance, radius: 0.08 * distance, angular_diameter_deg: 4,
+    },
+    fixed_light: "", lights: EVERY_LIGHT, renders: true,
+  };
+}
+
+/** Depth seen from a light's centre, in the light's own space: at the origin, shining along -Z.
+ * @param {{front: [string, Blob], back?: [string, Blob], receiver: [string, Blob], encoding: Json, tan_half_fov: number, distance: number}} given
+ * @returns {Source} */
+export function light_view_source({ front, back, receiver, encoding, tan_half_fov, distance }) {
+  const camera = { kind: "light", tan_half_fov };
+  const depth = back ? { front: front[0], back: back[0] } : { front: front[0] };
+  return {
+    kind: "light_view", title: front[0], files: new Map([front, receiver, ...(back ? [back] : [])]), objects: [],
+    occluders: { camera, depth, encoding }, receivers: { camera, depth: receiver[0], encoding },
+    room: { middle: [0, 0, -distance], reach: distance, low: -distance, high: distance },
+    light: {
+      kind: "rectangle", position: [0, 0, 0], target: [0, 0, -distance],
+      width: 0.15 * distance, height: 0.15 * distance, radius: 0, angular_diameter_deg: 0,
+    },
+    fixed_light: "Only the size can change: these maps were seen from this light's centre along its axis. Another place would need other maps.",
+    lights: ["rectangle", "point"], renders: false,
+  };
+}
+
+/** @param {Source} source @param {Light} light @param {{kind: string, settings: Json}} technique @returns {Json} */
+export function scene_json(source, light, technique) {
+  return {
+    penumbra: 1,
+    light: light_json(light),
+    ...(source.objects.length > 0 ? { objects: source.objects } : {}),
+    occluders: source.occluders,
+    receivers: source.receivers,
+    technique: { kind: technique.kind, ...technique.settings },
+  };
+}

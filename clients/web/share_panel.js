@@ -1,0 +1,92 @@
+// @ts-check
+// The same mask without the page: scene file, command lines, downloads.
+import { button, element } from "./fields.js";
+
+/** @typedef {import("./client.js").Json} Json */
+/** @typedef {import("./client.js").Files} Files */
+
+/** @type {{label: string, extension: string, media_type: string}[]} */
+export const FORMATS = [
+  { label: "PNG, 16 bit", extension: "png", media_type: "image/png" },
+  { label: "EXR", extension: "exr", media_type: "image/x-exr" },
+  { label: "TIFF", extension: "tif", media_type: "image/tiff" },
+  { label: "PFM", extension: "pfm", media_type: "image/x-portable-floatmap" },
+];
+
+/** One line a key, arrays on one line. @param {Json} scene */
+export function scene_text(scene) {
+  const inline = (/** @type {any} */ value) => JSON.stringify(value).replaceAll('":', '": ').replaceAll(/,(?=["{[\-\d])/g, ", ");
+  const section = (/** @type {any} */ value) =>
+    Array.isArray(value) ? `[\n${value.map((one) => `    ${inline(one)}`).join(",\n")}\n  ]` : inline(value);
+  return `{\n${Object.entries(scene).map(([key, value]) => `  "${key}": ${section(value)}`).join(",\n")}\n}\n`;
+}
+
+/** @param {Files} files @param {string} origin @param {boolean} token */
+export function curl_line(files, origin, token) {
+  const parts = ["-F scene=@scene.json", ...[...files.keys()].map((name) => `-F ${name}=@${name}`)];
+  const secret = token ? ' -H "Authorization: Bearer $PENUMBRA_SERVER_TOKEN"' : "";
+  return `curl --fail-with-body${secret} -H 'Accept: image/x-exr' ${parts.join(" ")} ${origin}/v1/masks -o mask.exr`;
+}
+
+export const penumbra_line = () => "penumbra mask scene.json -o mask.exr";
+
+/** @param {Blob} blob @param {string} name */
+export function save(blob, name) {
+  const address = URL.createObjectURL(blob);
+  element("a", { href: address, download: name }).click();
+  // The browser has taken it by the next turn of its loop; a minute is plenty.
+  setTimeout(() => URL.revokeObjectURL(address), 60000);
+}
+
+/** @param {string} label @param {string} id @param {() => string} text @param {(said: string) => void} say */
+function copyable(label, id, text, say) {
+  const area = element("pre", { id, tabIndex: 0 });
+  area.setAttribute("aria-label", label);
+  const copy = button("Copy", async () => {
+    try {
+      await navigator.clipboard.writeText(text());
+      say(`${label} copied`);
+    } catch {
+      // Browsers give the clipboard only to pages over HTTPS or on localhost: select it instead.
+      getSelection()?.selectAllChildren(area);
+      say("Selected: copy it with Ctrl+C");
+    }
+  }, "quiet");
+  return { node: element("div", { className: "copyable" }, element("div", { className: "copy_head" }, element("h3", {}, label), copy), area), area };
+}
+
+export class SharePanel {
+  /** @param {HTMLElement} place
+   * @param {{state: () => {scene: Json, files: Files, token: boolean}, download: (format: typeof FORMATS[number]) => void, say: (said: string) => void}} page */
+  constructor(place, page) {
+    this.page = page;
+    this.scene = copyable("Scene file", "scene_text", () => scene_text(page.state().scene), page.say);
+    this.curl = copyable("curl", "curl_line", () => this.#curl(), page.say);
+    this.penumbra = copyable("Command line", "penumbra_line", penumbra_line, page.say);
+    const downloads = FORMATS.map((format) => button(format.label, () => page.download(format)));
+    const scene = button("scene.json", () => save(new Blob([scene_text(page.state().scene)], { type: "application/json" }), "scene.json"));
+    const details = element("details", {}, element("summary", {}, "Show the scene file"), this.scene.node);
+    this.details = details;
+    details.addEventListener("toggle", () => this.refresh());
+    place.append(
+      element("h3", {}, "Download"),
+      element("div", { className: "buttons", role: "group", ariaLabel: "Download" }, ...downloads, scene),
+      element("p", { className: "help", id: "files_note" }), this.penumbra.node, this.curl.node, details,
+    );
+    this.note = /** @type {HTMLElement} */ (place.querySelector("#files_note"));
+  }
+
+  #curl() {
+    const { files, token } = this.page.state();
+    return curl_line(files, location.origin, token);
+  }
+
+  refresh() {
+    const { scene, files } = this.page.state();
+    this.note.textContent = `The lines below take scene.json${files.size > 0 ? ` and, beside it, ${[...files.keys()].join(", ")}` : ""}.`;
+    this.curl.area.textContent = this.#curl();
+    this.penumbra.area.textContent = penumbra_line();
+    // Long, so only while it is seen.
+    if (this.details.open) this.scene.area.textContent = scene_text(scene);
+  }
+}

@@ -1,0 +1,81 @@
+// @ts-check
+// A technique and its keys, as controls made from what the service says of it.
+import { button, choice_field, element, flag_field, number_field } from "./fields.js";
+
+/** @typedef {import("./client.js").Technique} Technique */
+/** @typedef {import("./client.js").Json} Json */
+/** `settings` holds the keys that differ from their defaults. @typedef {{kind: string, settings: Json}} Choice */
+
+/** The widest range that a slider is offered for: each of its steps is then a few pixels wide. */
+const SLIDER_STEPS = 128;
+
+/** @param {string} key */
+const label_of = (key) => (key.charAt(0).toUpperCase() + key.slice(1)).replaceAll("_", " ");
+
+/** One key's control.
+ * @param {string} key @param {Json} schema @param {any} value @param {(value: any) => void} changed */
+function control_of(key, schema, value, changed) {
+  const common = { label: label_of(key), name: key, help: schema.description ?? "" };
+  if (Array.isArray(schema.enum)) {
+    // Options are texts; the value that is sent is the schema's own.
+    const options = schema.enum.map((/** @type {any} */ one) => /** @type {[string, string]} */ ([String(one), String(one)]));
+    return choice_field({ ...common, value: String(value), options }, (text) => changed(schema.enum.find((/** @type {any} */ one) => String(one) === text))).node;
+  }
+  switch (schema.type) {
+    case "boolean":
+      return flag_field({ ...common, value }, changed).node;
+    case "integer": {
+      // Beyond 2^53 a script's numbers are not whole any more.
+      const max = schema.maximum === undefined ? undefined : Math.min(schema.maximum, Number.MAX_SAFE_INTEGER);
+      const slider = schema.minimum !== undefined && max !== undefined && max - schema.minimum <= SLIDER_STEPS;
+      return number_field({ ...common, value, min: schema.minimum, max, step: 1, unit: schema["x-unit"], slider }, changed).node;
+    }
+    case "number": {
+      const bounded = schema.minimum !== undefined && schema.maximum !== undefined;
+      return number_field({ ...common, value, min: schema.minimum, max: schema.maximum, unit: schema["x-unit"], slider: bounded }, changed).node;
+    }
+    default:
+      return element("p", { className: "help" }, `${label_of(key)}: this page has no control for the type "${schema.type}"; set it in the scene file.`);
+  }
+}
+
+/** Fills `place` with the choice of technique and its controls, and calls `changed` with each new choice.
+ * @param {HTMLElement} place @param {Technique[]} techniques @param {Choice} choice @param {string} light kind of the light
+ * @param {(choice: Choice) => void} changed */
+export function technique_panel(place, techniques, choice, light, changed) {
+  const technique = techniques.find((one) => one.kind === choice.kind);
+  const pick = choice_field(
+    { label: "Technique", name: "kind", value: choice.kind, options: techniques.map((one) => [one.kind, label_of(one.kind)]) },
+    (kind) => {
+      const next = { kind, settings: {} };
+      technique_panel(place, techniques, next, light, changed);
+      place.querySelector("select")?.focus();
+      changed(next);
+    },
+  );
+  place.replaceChildren(pick.node);
+  if (!technique) return;
+  place.append(element("p", { className: "help" }, technique.summary));
+  if (!technique.lights.includes(light))
+    place.append(element("p", { className: "notice", role: "status" }, `${label_of(technique.kind)} takes no ${light} light; it takes: ${technique.lights.join(", ")}.`));
+
+  const settings = { ...choice.settings };
+  const keys = Object.entries(/** @type {Record<string, Json>} */ (technique.schema.properties)).filter(([key]) => key !== "kind");
+  for (const [key, schema] of keys) {
+    place.append(
+      control_of(key, schema, settings[key] ?? schema.default, (value) => {
+        if (value === schema.default) delete settings[key];
+        else settings[key] = value;
+        changed({ kind: choice.kind, settings: { ...settings } });
+      }),
+    );
+  }
+  if (keys.length > 0)
+    place.append(
+      button("Defaults", () => {
+        const next = { kind: choice.kind, settings: {} };
+        technique_panel(place, techniques, next, light, changed);
+        changed(next);
+      }, "quiet"),
+    );
+}
