@@ -1,11 +1,13 @@
 // Images from bytes, through OpenImageIO 2.4. What it promises little about is checked here: sizes before any sample is decoded, one named
-// reader and no other, kinds of TIFF that its reader is known to trip over, and errors that come with a "true" (TIFF).
+// reader and no other, kinds of TIFF that its reader is known to trip over, and errors that come with a "true" (TIFF). PFM and the plain
+// kind of EXR are read by code of our own; an EXR that is not plain, or not sound, goes to OpenImageIO.
 #include "io/image_io.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <type_traits>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -13,6 +15,7 @@
 #include <penumbra/error.hpp>
 
 #include "io/exr_header.hpp"
+#include "io/exr_scanlines.hpp"
 #include "io/image_format.hpp"
 #include "io/pfm.hpp"
 #include "io/png.hpp"
@@ -215,7 +218,53 @@ template <class Sample> std::vector<float> as_floats(Source& source, const Pick&
 {
     std::vector<Sample> samples(count);
     source.read(pick.part, pick.channel, pick.channel + 1, type, samples.data());
-    return {samples.begin(), samples.end()};
+    if constexpr (std::is_same_v<Sample, float>)
+        return samples;
+    else
+        return {samples.begin(), samples.end()};
+}
+
+// The channel that pick_depth would pick, where the names alone say so.
+std::optional<std::size_t> plain_depth_channel(const std::vector<ExrChannel>& channels, std::string_view asked)
+{
+    const auto find = [&](const auto& fits) -> std::optional<std::size_t> {
+        const auto found = std::ranges::find_if(channels, fits, &ExrChannel::name);
+        if (found == channels.end()) return {};
+        return static_cast<std::size_t>(found - channels.begin());
+    };
+    if (!asked.empty()) return find([&](const std::string& name) { return name == asked; });
+    if (const auto z = find([](const std::string& name) { return name == "Z"; })) return z;
+    if (const auto z = find([](const std::string& name) { return name == "depth.Z"; })) return z;
+    // Of several layers OpenImageIO's order decides; and the only channel must not be alpha.
+    const auto is_layer = [](const std::string& name) { return name.ends_with(".Depth.Z"); };
+    if (std::ranges::count_if(channels, is_layer, &ExrChannel::name) == 1) return find(is_layer);
+    const std::string& first = channels.front().name;
+    const char initial = first[first.rfind('.') + 1]; // of the name behind the layer; 0 when there is none
+    if (channels.size() == 1 && initial != 'A' && initial != 'a') return 0;
+    return {};
+}
+
+// The depth of a plain EXR that is within the limit; everything else is nothing, and OpenImageIO's to read or to refuse.
+std::optional<RawDepth> plain_depth(std::span<const std::byte> exr, const ExrHeader& header, std::string_view channel,
+                                    std::uint64_t max_samples)
+{
+    if (!has_plain_scanlines(header)) return {};
+    const std::uint64_t pixels = static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
+    if (pixels > max_samples / header.channels.size()) return {};
+    const std::optional<std::size_t> picked = plain_depth_channel(header.channels, channel);
+    if (!picked) return {};
+    std::optional<std::vector<float>> samples = read_exr_channel(exr, header, *picked);
+    if (!samples) return {};
+    return RawDepth{header.width, header.height, header.channels[*picked].type, std::move(*samples)};
+}
+
+// An image that has one channel of floats, the same way.
+std::optional<Image> plain_image(std::span<const std::byte> exr, const ExrHeader& header, std::uint64_t max_samples)
+{
+    if (!has_plain_scanlines(header) || header.channels.size() != 1 || header.channels[0].type == SampleType::uint32) return {};
+    std::optional<RawDepth> raw = plain_depth(exr, header, header.channels[0].name, max_samples);
+    if (!raw) return {};
+    return Image{raw->width, raw->height, 1, std::move(raw->samples)};
 }
 
 } // namespace
@@ -224,7 +273,9 @@ Image decode_image(std::span<const std::byte> bytes, std::string_view where, std
 {
     const ImageFormat format = format_from(bytes, where);
     if (format == ImageFormat::pfm) return decode_pfm(bytes, where, max_samples);
-    if (format == ImageFormat::exr) check_exr_header(bytes, where, max_samples);
+    if (format == ImageFormat::exr)
+        if (std::optional<Image> image = plain_image(bytes, check_exr_header(bytes, where, max_samples), max_samples))
+            return *std::move(image);
     Source source(bytes, format, where);
     if (source.spec().nchannels > 4)
         throw broken(where,
@@ -248,7 +299,9 @@ RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view cha
                                                     : "is a colour PFM; depth needs one channel");
         return {image.width, image.height, SampleType::float32, std::move(image.pixels)};
     }
-    if (format == ImageFormat::exr) check_exr_header(bytes, where, max_samples);
+    if (format == ImageFormat::exr)
+        if (std::optional<RawDepth> raw = plain_depth(bytes, check_exr_header(bytes, where, max_samples), channel, max_samples))
+            return *std::move(raw);
     Source source(bytes, format, where);
     const Pick pick = pick_depth(source, channel, where);
     if (!source.seek(pick.part)) throw broken(where, "is truncated or broken");
