@@ -17,17 +17,15 @@ namespace {
 
 thread_local Connection* served = nullptr;
 
-// How long an answer may take to be taken by the client, and how long (and how much of) a refused upload is still read.
-constexpr std::chrono::seconds write_time{30}, drain_time{2};
-constexpr std::uint64_t drain_bytes = std::uint64_t{4} << 20;
+constexpr std::size_t read_bytes = 65536; // at a time
 
-// Waits until the socket can be read or written; false when the time is up.
-bool wait_for(socket_t socket, short what, Deadline::Clock::time_point end)
+// Waits until the socket can be read; false when the time is up.
+bool wait_for_bytes(socket_t socket, Deadline::Clock::time_point end)
 {
     for (;;) {
         const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Deadline::Clock::now()).count();
         if (left <= 0) return false;
-        pollfd entry{socket, what, 0};
+        pollfd entry{socket, POLLIN, 0};
         const int ready = ::poll(&entry, 1, static_cast<int>(std::min<long>(left, 1 << 30)));
         if (ready > 0) return true;
         if (ready < 0 && errno != EINTR) return false;
@@ -52,53 +50,64 @@ void name_of(socket_t socket, NameCall call, std::string& ip, int& port)
 
 } // namespace
 
-Connection::Connection(socket_t socket, Deadline headers, Deadline request) : socket_(socket), headers_(headers), request_(request)
+Connection::Connection(Lobby& lobby, Arrival arrival, Deadline request)
+    : begun(arrival.begun), lobby_(lobby), socket_(arrival.socket), request_(request), timed_out_(arrival.timed_out), ended_(arrival.ended),
+      buffer_(std::move(arrival.bytes))
 {
     const int on = 1;
     setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    // A request line without an end is none; a line that cannot be read has the library answer, and headers_too_large() say what.
+    if (buffer_.find('\n') == std::string::npos) {
+        header_bytes_ = max_header_bytes;
+        buffer_ = "\r\n";
+    }
     served = this;
 }
 
 Connection::~Connection()
 {
     served = nullptr;
-    ::shutdown(socket_, SHUT_WR);
-    drain();
-    ::close(socket_);
+    // A socket that is closed with unread data sends a reset, which takes the answer from under a client that is still sending.
+    const bool unread = !ended_ && !timed_out_ && (in_body_ ? body_left_ > buffer_.size() - from_ : headers_too_large());
+    lobby_.leave(socket_, std::move(rest_), unread);
 }
 
 Connection& Connection::current() { return *served; }
 
 bool Connection::fill()
 {
-    from_ = to_ = 0;
-    if (ended_) return false;
-    if (!wait_for(socket_, POLLIN, in_body_ ? request_.end() : headers_.end())) {
+    from_ = 0;
+    buffer_.clear();
+    // The headers are all here: what is missing of them does not come.
+    if (ended_ || !in_body_) return false;
+    const auto slow = transfer_end(body_begun_, body_bytes_);
+    if (!wait_for_bytes(socket_, std::min(slow, request_.end()))) {
         timed_out_ = true;
+        too_slow_ = slow < request_.end();
         return false;
     }
-    const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), 0);
-    if (got <= 0) {
-        ended_ = true;
-        return false;
-    }
-    to_ = static_cast<std::size_t>(got);
-    return true;
+    buffer_.resize(read_bytes);
+    const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
+    ended_ = got <= 0;
+    buffer_.resize(got <= 0 ? 0 : static_cast<std::size_t>(got));
+    return !ended_;
 }
 
 ssize_t Connection::read(char* to, size_t size)
 {
-    if (from_ == to_ && !fill()) return ended_ ? 0 : -1;
+    if (from_ == buffer_.size() && !fill()) return ended_ ? 0 : -1;
     // A drip-feeding client makes poll succeed every time: the deadline counts, not the pause.
-    if ((in_body_ ? request_ : headers_).passed()) {
+    if (in_body_ && request_.passed()) {
         timed_out_ = true;
         return -1;
     }
-    const std::size_t count = std::min(size, to_ - from_);
-    if (in_body_)
+    const std::size_t count = std::min(size, buffer_.size() - from_);
+    if (in_body_) {
         body_left_ -= std::min<std::uint64_t>(body_left_, count);
-    else if ((header_bytes_ += count) > max_header_bytes)
+        body_bytes_ += count;
+    } else if ((header_bytes_ += count) > max_header_bytes) {
         return -1;
+    }
     std::memcpy(to, buffer_.data() + from_, count);
     from_ += count;
     return static_cast<ssize_t>(count);
@@ -106,9 +115,8 @@ ssize_t Connection::read(char* to, size_t size)
 
 ssize_t Connection::write(const char* from, size_t size)
 {
-    const auto end = Deadline::Clock::now() + write_time;
     std::size_t done = 0;
-    while (done < size) {
+    while (rest_.empty() && done < size) {
         const ssize_t sent = ::send(socket_, from + done, size - done, MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent > 0)
             done += static_cast<std::size_t>(sent);
@@ -116,9 +124,10 @@ ssize_t Connection::write(const char* from, size_t size)
             continue;
         else if (sent < 0 && errno != EAGAIN && errno != EWOULDBLOCK)
             return -1;
-        else if (!wait_for(socket_, POLLOUT, end))
-            return -1;
+        else
+            break;
     }
+    rest_.append(from + done, size - done);
     return static_cast<ssize_t>(size);
 }
 
@@ -129,20 +138,7 @@ void Connection::begin_body(std::uint64_t expected)
 {
     in_body_ = true;
     body_left_ = expected;
-}
-
-void Connection::drain()
-{
-    // A socket that is closed with unread data sends a reset, which takes the answer from under a client that is still sending. So a
-    // refused upload is read on, for a while, and forgotten.
-    const bool unread = in_body_ ? body_left_ > to_ - from_ : headers_too_large();
-    if (!unread || ended_ || timed_out_) return;
-    const auto end = Deadline::Clock::now() + drain_time;
-    for (std::uint64_t drained = 0; drained < drain_bytes && wait_for(socket_, POLLIN, end);) {
-        const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), 0);
-        if (got <= 0) break;
-        drained += static_cast<std::uint64_t>(got);
-    }
+    body_begun_ = Deadline::Clock::now();
 }
 
 } // namespace penumbra::server

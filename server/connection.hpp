@@ -2,10 +2,10 @@
 //
 // Debian's cpp-httplib 0.11.4 limits neither the number of header lines nor their bytes, times each recv instead of the request, gives no
 // answer to a client that closed its sending side, and closes sockets with unread data, so that the answer to a refused upload is lost.
-// This stream does all of that right; only the library's parser of request line and headers is used.
+// This stream does all of that right; only the library's parser of request line and headers is used. The headers are here before a thread
+// is (lobby.hpp), the body is waited for, and what the client does not take at once of its answer is left to the lobby.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -13,15 +13,14 @@
 #include <httplib.h>
 
 #include "gate.hpp"
+#include "lobby.hpp"
 
 namespace penumbra::server {
 
-constexpr std::size_t max_header_bytes = 16384; // request line and headers together
-
 class Connection final : public httplib::Stream {
 public:
-    // Takes the socket, and closes it when it goes.
-    Connection(socket_t socket, Deadline headers, Deadline request);
+    // Takes the socket, and gives it back to the lobby when it goes. `lobby` outlives it.
+    Connection(Lobby& lobby, Arrival arrival, Deadline request);
     ~Connection() override;
     Connection(const Connection&) = delete;
     Connection& operator=(const Connection&) = delete;
@@ -43,23 +42,26 @@ public:
 
     const Deadline& request() const { return request_; }
     bool timed_out() const { return timed_out_; }
+    bool too_slow() const { return too_slow_; } // timed out before the request's deadline: see transfer_end()
     bool headers_too_large() const { return header_bytes_ > max_header_bytes; }
 
     // Of the request, for its handler and its log line. `reason` and `inside`: why it was refused, for metrics and for the log alone.
     std::string content_type, request_id, reason, inside;
-    Deadline::Clock::time_point begun = Deadline::Clock::now();
+    Deadline::Clock::time_point begun;
 
 private:
-    bool fill(); // the buffer from the socket; false: nothing came
-    void drain();
+    bool fill(); // the buffer with more of the body; false: nothing came
 
+    Lobby& lobby_;
     socket_t socket_;
-    Deadline headers_, request_;
-    bool in_body_ = false, timed_out_ = false, ended_ = false;
+    Deadline request_;
+    bool in_body_ = false, timed_out_ = false, too_slow_ = false, ended_ = false;
     std::size_t header_bytes_ = 0;
-    std::uint64_t body_left_ = 0;
-    std::array<char, 65536> buffer_;
-    std::size_t from_ = 0, to_ = 0; // of the buffer
+    std::uint64_t body_left_ = 0, body_bytes_ = 0;
+    Deadline::Clock::time_point body_begun_;
+    std::string buffer_;
+    std::size_t from_ = 0; // what of the buffer was read
+    std::string rest_;     // of the answer
 };
 
 } // namespace penumbra::server

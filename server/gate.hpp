@@ -15,7 +15,7 @@ namespace penumbra::server {
 class Deadline {
 public:
     using Clock = std::chrono::steady_clock;
-    explicit Deadline(Clock::duration time) : limit_(time), end_(Clock::now() + time) {}
+    explicit Deadline(Clock::duration time, Clock::time_point begin = Clock::now()) : limit_(time), end_(begin + time) {}
 
     Clock::time_point end() const { return end_; }
     bool passed() const { return Clock::now() >= end_; }

@@ -27,7 +27,8 @@ namespace {
 using httplib::Request;
 using httplib::Response;
 
-constexpr int backlog = 1024; // connections that the kernel keeps for us; the HTTP library asks for 5
+constexpr int backlog = 1024;                // connections that the kernel keeps for us; the HTTP library asks for 5
+constexpr std::size_t max_connections = 512; // in the lobby; with threads and device files below the usual limit of 1024 descriptors
 
 double seconds_since(Deadline::Clock::time_point begin) { return std::chrono::duration<double>(Deadline::Clock::now() - begin).count(); }
 
@@ -119,8 +120,7 @@ class Service::Http final : public httplib::Server {
 public:
     explicit Http(Service& service) : service_(service)
     {
-        const auto threads = static_cast<std::size_t>(service.options_.io_threads);
-        new_task_queue = [threads] { return new httplib::ThreadPool(threads); };
+        new_task_queue = [this] { return new Reception(*this); };
         set_payload_max_length(static_cast<std::size_t>(service.options_.body_bytes));
         // Not SO_REUSEPORT, with which a second server would take half of the connections.
         set_socket_options([](socket_t socket) {
@@ -132,12 +132,42 @@ public:
     void lengthen_backlog() { ::listen(svr_sock_, backlog); }
 
 private:
+    // Between the library's accepting thread and the threads that answer: the lobby.
+    class Reception final : public httplib::TaskQueue {
+    public:
+        explicit Reception(Http& http)
+            : threads_(static_cast<std::size_t>(http.service_.options_.io_threads)),
+              lobby_(max_connections, std::chrono::seconds(http.service_.options_.header_s), [this, &http](Arrival arrival) {
+                  threads_.enqueue([this, &http, arrival = std::move(arrival)]() mutable { http.serve(lobby_, std::move(arrival)); });
+              })
+        {
+            http.lobby_ = &lobby_;
+        }
+        void enqueue(std::function<void()> accepted) override { accepted(); }
+        void shutdown() override
+        {
+            lobby_.wait_for_arrivals();
+            threads_.shutdown(); // when all is answered
+            lobby_.wait_for_leaving();
+        }
+
+    private:
+        httplib::ThreadPool threads_;
+        Lobby lobby_;
+    };
+
     bool process_and_close_socket(socket_t socket) override
     {
-        const server::Options& options = service_.options_; // the library has a member of this name
-        Connection connection(socket, Deadline(std::chrono::seconds(options.header_s)), Deadline(std::chrono::seconds(options.deadline_s)));
+        lobby_->arrive(socket);
+        return true;
+    }
+
+    void serve(Lobby& lobby, Arrival arrival)
+    {
+        const Deadline deadline(std::chrono::seconds(service_.options_.deadline_s), arrival.begun);
+        Connection connection(lobby, std::move(arrival), deadline);
         bool closed = false;
-        return process_request(connection, true, closed, [&](Request& request) { begin(request, connection); });
+        process_request(connection, true, closed, [&](Request& request) { begin(request, connection); });
     }
 
     // After the headers are read, before anything is decided.
@@ -154,6 +184,7 @@ private:
     }
 
     Service& service_;
+    Lobby* lobby_ = nullptr; // while it serves
 };
 
 Service::Service(Options options, Engine engine, Log log)
@@ -251,6 +282,10 @@ void Service::post_mask(const Request& request, Response& response, const httpli
         body.append(data, size);
         return true;
     });
+    if (connection.too_slow())
+        throw Problem(408, "slow_body",
+                      "the body came at less than " + std::to_string(slowest_transfer) + " bytes a second, " +
+                          std::to_string(transfer_grace.count()) + " s after its begin");
     if (connection.timed_out())
         throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
     if (!whole || body.size() != length)

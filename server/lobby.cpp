@@ -1,0 +1,247 @@
+#include "lobby.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <vector>
+
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <penumbra/error.hpp>
+
+namespace penumbra::server {
+namespace {
+
+// How long, and how much of, what a refused client still sends is read.
+constexpr std::chrono::seconds forget_time{2};
+constexpr std::size_t forget_bytes = std::size_t{4} << 20;
+
+// Answers that wait for their clients, together. Above it the one that waits longest is given up.
+constexpr std::uint64_t max_waiting_bytes = std::uint64_t{256} << 20;
+
+constexpr std::chrono::milliseconds tick{50}; // how late a deadline may be noticed
+
+// The end of the headers: the first line that is only CR LF, as the HTTP library's parser sees it (it skips lines that end in LF alone).
+bool has_headers(const std::string& bytes, std::size_t searched)
+{
+    return bytes.find("\n\r\n", searched < 2 ? 0 : searched - 2) != std::string::npos;
+}
+
+} // namespace
+
+std::chrono::steady_clock::time_point transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes)
+{
+    return begin + transfer_grace + std::chrono::milliseconds(bytes * 1000 / slowest_transfer);
+}
+
+Lobby::Lobby(std::size_t connections, Clock::duration header_time, Serve serve)
+    : places_(connections), header_time_(header_time), serve_(std::move(serve)), events_(epoll_create1(EPOLL_CLOEXEC))
+{
+    if (events_ < 0) throw Error(ErrorCode::internal, "no epoll descriptor", "expected fewer open files");
+    thread_ = std::thread([this] { run(); });
+}
+
+Lobby::~Lobby()
+{
+    wait_for_leaving();
+    {
+        const std::scoped_lock lock(mutex_);
+        ending_ = true;
+    }
+    thread_.join();
+    ::close(events_);
+}
+
+void Lobby::arrive(int socket)
+{
+    const std::scoped_lock lock(mutex_);
+    if (guests_.size() >= places_) make_room();
+    Guest guest;
+    guest.begun = guest.phase_begun = Clock::now();
+    guests_.emplace(socket, std::move(guest));
+    watch(socket, Phase::headers, false);
+}
+
+void Lobby::leave(int socket, std::string rest, bool unread)
+{
+    if (rest.empty() && !unread) {
+        ::close(socket);
+        return;
+    }
+    const std::scoped_lock lock(mutex_);
+    if (guests_.size() >= places_) make_room();
+    Guest guest;
+    guest.phase = Phase::sending;
+    guest.begun = guest.phase_begun = Clock::now();
+    guest.bytes = std::move(rest);
+    guest.unread = unread;
+    waiting_bytes_ += guest.bytes.size();
+    const auto entered = guests_.emplace(socket, std::move(guest)).first;
+    watch(socket, Phase::sending, false);
+    if (entered->second.bytes.empty()) begin_forgetting(entered);
+}
+
+void Lobby::wait_for_arrivals()
+{
+    for (;;) {
+        {
+            const std::scoped_lock lock(mutex_);
+            if (!any(Phase::headers)) return;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+}
+
+void Lobby::wait_for_leaving()
+{
+    for (;;) {
+        if (connections() == 0) return;
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+}
+
+std::size_t Lobby::connections() const
+{
+    const std::scoped_lock lock(mutex_);
+    return guests_.size();
+}
+
+bool Lobby::any(Phase phase) const
+{
+    return std::ranges::any_of(guests_, [&](const auto& entry) { return entry.second.phase == phase; });
+}
+
+void Lobby::run()
+{
+    std::array<epoll_event, 64> ready{};
+    auto looked = Clock::now();
+    for (;;) {
+        const int count = epoll_wait(events_, ready.data(), static_cast<int>(ready.size()), static_cast<int>(tick.count()));
+        const std::scoped_lock lock(mutex_);
+        for (int i = 0; i < count; ++i)
+            if (const auto guest = guests_.find(ready[static_cast<std::size_t>(i)].data.fd); guest != guests_.end()) move_on(guest);
+        if (const auto now = Clock::now(); now - looked >= tick) {
+            looked = now;
+            end_late(now);
+        }
+        if (ending_) return;
+    }
+}
+
+void Lobby::move_on(Guests::iterator guest)
+{
+    switch (guest->second.phase) {
+    case Phase::headers:
+        return read_headers(guest);
+    case Phase::sending:
+        return send(guest);
+    case Phase::forgetting:
+        return forget(guest);
+    }
+}
+
+void Lobby::read_headers(Guests::iterator guest)
+{
+    std::array<char, 65536> buffer;
+    const ssize_t got = ::recv(guest->first, buffer.data(), buffer.size(), MSG_DONTWAIT);
+    if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
+    if (got <= 0) return hand_over(guest, false, true);
+    std::string& bytes = guest->second.bytes;
+    const std::size_t searched = bytes.size();
+    bytes.append(buffer.data(), static_cast<std::size_t>(got));
+    if (bytes.size() > max_header_bytes || has_headers(bytes, searched)) hand_over(guest, false, false);
+}
+
+void Lobby::send(Guests::iterator entry)
+{
+    Guest& guest = entry->second;
+    const ssize_t sent =
+        ::send(entry->first, guest.bytes.data() + guest.done, guest.bytes.size() - guest.done, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
+    if (sent < 0) return close(entry);
+    guest.done += static_cast<std::size_t>(sent);
+    if (guest.done == guest.bytes.size()) begin_forgetting(entry);
+}
+
+void Lobby::begin_forgetting(Guests::iterator entry)
+{
+    Guest& guest = entry->second;
+    waiting_bytes_ -= guest.bytes.size();
+    guest.bytes = {};
+    guest.done = 0;
+    ::shutdown(entry->first, SHUT_WR);
+    if (!guest.unread) return close(entry);
+    guest.phase = Phase::forgetting;
+    guest.phase_begun = Clock::now();
+    watch(entry->first, Phase::forgetting, true);
+}
+
+void Lobby::forget(Guests::iterator guest)
+{
+    std::array<char, 65536> buffer;
+    const ssize_t got = ::recv(guest->first, buffer.data(), buffer.size(), MSG_DONTWAIT);
+    if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
+    if (got <= 0 || (guest->second.done += static_cast<std::size_t>(got)) > forget_bytes) close(guest);
+}
+
+void Lobby::hand_over(Guests::iterator guest, bool timed_out, bool ended)
+{
+    Arrival arrival{guest->first, guest->second.begun, std::move(guest->second.bytes), timed_out, ended};
+    // Who has not even said a line gets no answer: there is no request.
+    if ((timed_out || ended) && arrival.bytes.find('\n') == std::string::npos) return close(guest);
+    epoll_ctl(events_, EPOLL_CTL_DEL, guest->first, nullptr);
+    guests_.erase(guest);
+    serve_(std::move(arrival));
+}
+
+void Lobby::end_late(Clock::time_point now)
+{
+    std::vector<int> late;
+    for (const auto& [socket, guest] : guests_) {
+        const bool over = guest.phase == Phase::headers   ? now - guest.phase_begun >= header_time_
+                          : guest.phase == Phase::sending ? now >= transfer_end(guest.phase_begun, guest.done)
+                                                          : now - guest.phase_begun >= forget_time;
+        if (over) late.push_back(socket);
+    }
+    for (const int socket : late) {
+        const auto guest = guests_.find(socket);
+        if (guest->second.phase == Phase::headers)
+            hand_over(guest, true, false);
+        else
+            close(guest);
+    }
+    while (waiting_bytes_ > max_waiting_bytes) make_room();
+}
+
+void Lobby::make_room()
+{
+    // Headers come within milliseconds from clients that mean it, so the oldest that waits for them is the least loss; while answers are
+    // too many, only giving up answers helps.
+    const bool answers = waiting_bytes_ > max_waiting_bytes;
+    const auto loss = [&](const Guest& guest) {
+        return answers ? guest.phase != Phase::sending : guest.phase == Phase::headers ? 0 : guest.phase == Phase::forgetting ? 1 : 2;
+    };
+    const auto least = std::ranges::min_element(guests_, [&](const auto& a, const auto& b) {
+        return std::pair(loss(a.second), a.second.phase_begun) < std::pair(loss(b.second), b.second.phase_begun);
+    });
+    if (least != guests_.end()) close(least);
+}
+
+void Lobby::close(Guests::iterator guest)
+{
+    if (guest->second.phase == Phase::sending) waiting_bytes_ -= guest->second.bytes.size();
+    ::close(guest->first); // which takes it out of epoll's set
+    guests_.erase(guest);
+}
+
+void Lobby::watch(int socket, Phase phase, bool already)
+{
+    epoll_event event{};
+    event.events = phase == Phase::sending ? EPOLLOUT : EPOLLIN;
+    event.data.fd = socket;
+    epoll_ctl(events_, already ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, socket, &event);
+}
+
+} // namespace penumbra::server

@@ -1,0 +1,97 @@
+// Where connections are while no thread needs to be with them: until a request's headers are whole, while an answer waits for its client,
+// and while what a refused client still sends is read and forgotten.
+//
+// One thread looks after all of them, so that clients who trickle, idle or do not take their answers cost a descriptor and some bytes,
+// never one of the threads that answer requests.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
+
+namespace penumbra::server {
+
+constexpr std::size_t max_header_bytes = 16384; // request line and headers together
+
+// The slowest transfer that is waited for: after `transfer_grace` a body, or an answer, has to have moved on at `slowest_transfer` on
+// average.
+constexpr std::chrono::seconds transfer_grace{5};
+constexpr std::uint64_t slowest_transfer = 16384; // bytes a second
+
+// When a transfer that began at `begin` and has moved `bytes` is too slow.
+std::chrono::steady_clock::time_point transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes);
+
+// A connection whose headers are here, or will never be.
+struct Arrival {
+    int socket = -1;
+    std::chrono::steady_clock::time_point begun; // when it was accepted
+    std::string bytes;                           // request line, headers, and what came of the body
+    bool timed_out = false;
+    bool ended = false; // the client sends no more
+};
+
+class Lobby {
+public:
+    using Clock = std::chrono::steady_clock;
+    // `serve` gets each socket with its bytes, from the lobby's thread; it must not block.
+    using Serve = std::function<void(Arrival)>;
+
+    // More than `connections` at a time push out the oldest that has no whole headers, else that is being forgotten, else that is slowest
+    // to take its answer.
+    Lobby(std::size_t connections, Clock::duration header_time, Serve serve);
+    ~Lobby();
+    Lobby(const Lobby&) = delete;
+    Lobby& operator=(const Lobby&) = delete;
+
+    void arrive(int socket);
+    // Sends `rest`, ends its own side, then reads and forgets what the client still sends when `unread`; closes.
+    void leave(int socket, std::string rest, bool unread);
+
+    // Returns when every connection that arrived was served; arrivals from then on are not allowed.
+    void wait_for_arrivals();
+    // Returns when all have left.
+    void wait_for_leaving();
+
+    std::size_t connections() const; // those that are here now
+
+private:
+    enum class Phase { headers, sending, forgetting };
+    struct Guest {
+        Phase phase = Phase::headers;
+        Clock::time_point begun, phase_begun;
+        std::string bytes; // came, or are to be sent
+        std::size_t done = 0;
+        bool unread = false;
+    };
+    using Guests = std::unordered_map<int, Guest>;
+
+    void run();
+    void move_on(Guests::iterator guest);
+    void read_headers(Guests::iterator guest);
+    void send(Guests::iterator guest);
+    void forget(Guests::iterator guest);
+    void begin_forgetting(Guests::iterator guest);
+    void hand_over(Guests::iterator guest, bool timed_out, bool ended);
+    void end_late(Clock::time_point now);
+    void make_room();
+    void close(Guests::iterator guest);
+    void watch(int socket, Phase phase, bool already);
+    bool any(Phase phase) const;
+
+    const std::size_t places_;
+    const Clock::duration header_time_;
+    const Serve serve_;
+    const int events_;
+    mutable std::mutex mutex_;
+    Guests guests_;
+    std::uint64_t waiting_bytes_ = 0; // of answers
+    bool ending_ = false;
+    std::thread thread_;
+};
+
+} // namespace penumbra::server
