@@ -75,4 +75,4 @@ export function courtyard() {
 }
 
 /** The view of it. */
-export const courtyard_view = { kind: "pinhole", eye: [4.2, 5.4, 9.4], target: [0.35, 0.85, -0.6], up: [0, 1, 0], vertical_fov_deg: 33 };
+export const courtyard_view = { kind: "pinhole", eye: [4.2, 5.4, 9.4], target: [0.05, 0.75, -0.6], up: [0, 1, 0], vertical_fov_deg: 35 };

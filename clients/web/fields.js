@@ -16,10 +16,11 @@ export function element(tag, properties = {}, ...children) {
 }
 
 /** A label, a control and, where there is one, a help text that screen readers read with it.
- * @param {string} label @param {HTMLElement} control @param {string} help @param {...Node} more */
-function row(label, control, help, ...more) {
+ * @param {string} label @param {HTMLElement} control @param {{help?: string, unit?: string}} texts @param {...Node} more */
+function row(label, control, { help = "", unit = "" }, ...more) {
   control.id ||= `field_${++made}`;
-  const parts = [element("label", { htmlFor: control.id }, label), element("div", { className: "control" }, control, ...more)];
+  const units = unit ? [element("span", { className: "unit" }, ` ${unit}`)] : [];
+  const parts = [element("label", { htmlFor: control.id }, label, ...units), element("div", { className: "control" }, control, ...more)];
   if (help) {
     const text = element("p", { className: "help", id: `${control.id}_help` }, help);
     control.setAttribute("aria-describedby", text.id);
@@ -33,14 +34,14 @@ function row(label, control, help, ...more) {
 export function choice_field({ label, value, options, help = "", name = "" }, changed) {
   const select = element("select", { name }, ...options.map(([key, text]) => element("option", { value: key, selected: key === value }, text)));
   select.addEventListener("change", () => changed(select.value));
-  return { node: row(label, select, help), control: select };
+  return { node: row(label, select, { help }), control: select };
 }
 
 /** @param {{label: string, value: boolean, help?: string, name?: string}} given @param {(value: boolean) => void} changed */
 export function flag_field({ label, value, help = "", name = "" }, changed) {
   const box = element("input", { type: "checkbox", checked: value, name });
   box.addEventListener("change", () => changed(box.checked));
-  return { node: row(label, box, help), control: box };
+  return { node: row(label, box, { help }), control: box };
 }
 
 /** A number field, with a slider beside it where `slider` is set. What the range does not hold is marked and not passed on.
@@ -67,8 +68,7 @@ export function number_field({ label, value, min, max, step = "any", unit = "", 
     box.value = range.value;
     box.dispatchEvent(new Event("input"));
   });
-  const units = unit ? [element("span", { className: "unit" }, unit)] : [];
-  const node = row(label, box, help, ...units, ...(range ? [range] : []));
+  const node = row(label, box, { help, unit }, ...(range ? [range] : []));
   node.append(problem);
   const set = (/** @type {number} */ next) => {
     const text = String(Number(next.toPrecision(5)));

@@ -202,6 +202,8 @@ function show_resolutions() {
 /** @param {Source} next */
 function use(next) {
   stop_orbit();
+  // What the bundled scene opens with does not suit every other: those begin with the technique's defaults.
+  if (next.kind !== "courtyard" && a === FIRST.a) a = { kind: a.kind, settings: {} };
   source = next;
   light = next.light;
   view.b = shown.b = null;

@@ -20,7 +20,7 @@ export function courtyard_source() {
   return {
     kind: "courtyard", title: "Courtyard", objects: courtyard(), files: new Map(),
     occluders: { resolution: [384, 384] }, receivers: { camera: courtyard_view, resolution: [512, 512] },
-    room: { middle: [0, 0, 0.5], reach: 8, low: 1, high: 11 },
+    room: { middle: [0, 0, 1], reach: 7, low: 1, high: 11 },
     light: {
       kind: "rectangle", position: [-3.4, 6.2, 4.8], target: [0, 0.6, -0.6],
       width: 0.9, height: 0.9, radius: 0.5, angular_diameter_deg: 4,

@@ -84,7 +84,7 @@ export class SourcePanel {
 
   #light_view() {
     return [
-      element("p", { className: "help" }, "Square pixels, one view for all three, from the light's centre."),
+      element("p", { className: "help" }, "All from the light's centre, square. A back map counts where the technique's keys ask for it."),
       this.#file("front", "Occluders, front"), this.#file("back", "Occluders, back (optional)"), this.#file("receiver", "Receivers"),
       number_field({ label: "Field of view", name: "fov", value: this.fov_deg, min: 0.1, max: 179, unit: "degrees" }, (value) => (this.fov_deg = value)).node,
       ...this.#common(),

@@ -45,7 +45,7 @@ function control_of(key, schema, value, changed) {
 export function technique_panel(place, techniques, choice, light, changed) {
   const technique = techniques.find((one) => one.kind === choice.kind);
   const pick = choice_field(
-    { label: "Technique", name: "kind", value: choice.kind, options: techniques.map((one) => [one.kind, label_of(one.kind)]) },
+    { label: "Kind", name: "kind", value: choice.kind, options: techniques.map((one) => [one.kind, label_of(one.kind)]) },
     (kind) => {
       const next = { kind, settings: {} };
       technique_panel(place, techniques, next, light, changed);

@@ -1,0 +1,269 @@
+"""The page as its user has it: open it, move the light, compare, drop depth maps."""
+
+import json
+import re
+import time
+import unittest
+
+from browser import EXAMPLES, PageTest, Server
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
+
+
+class Page(PageTest):
+    def find(self, selector):
+        return self.browser.find_element(By.CSS_SELECTOR, selector)
+
+    def view(self, mode):
+        self.js("document.querySelector(`[name=mode][value=${arguments[0]}]`).click()", mode)
+
+    def wait_for_b(self):
+        self.wait_for("const d = document.getElementById('mask').dataset; return d.versionB && d.versionB === d.version")
+
+    def assert_shadowed(self, mask):
+        self.assertLess(mask["low"], 30)
+        self.assertGreater(mask["high"], 250)
+        self.assertGreater(mask["between"], 0.005)
+
+    def test_opens_with_the_bundled_scene_shadowed(self):
+        mask = self.mask()
+        self.assertEqual(mask["size"], [512, 512])
+        self.assert_shadowed(mask)
+        self.assertEqual(self.problem(), "")
+        self.assertIn("shade", self.find("#figures").text)
+        self.screenshot("page_light.png")
+        self.resize(1440, 960, dark=True)
+        self.screenshot("page_dark.png")
+
+    def test_the_light_moves_by_keyboard(self):
+        pad = self.find("#light_pad")
+        seen = [self.mask()["digest"]]
+        for key in (Keys.ARROW_RIGHT, Keys.ARROW_DOWN, Keys.PAGE_UP, Keys.SHIFT + Keys.ARROW_LEFT):
+            self.change(lambda: pad.send_keys(key))
+            seen.append(self.mask()["digest"])
+        self.assertEqual(len(set(seen)), len(seen), "each step changes the mask")
+        self.assertIn("Light from above, at x", pad.get_attribute("aria-label"))
+
+    def test_the_light_moves_by_dragging(self):
+        pad = self.find("#light_pad")
+        before = self.mask()
+        self.change(lambda: ActionChains(self.browser, duration=50).move_to_element_with_offset(pad, -40, 60).click_and_hold()
+                    .move_by_offset(50, -20).move_by_offset(60, 30).release().perform())
+        time.sleep(0.3)
+        after = self.mask()
+        self.assertNotEqual(before["digest"], after["digest"])
+        self.assert_shadowed(after)
+
+    def set_number(self, selector, value):
+        self.js("const c = document.querySelector(arguments[0]); c.value = arguments[1]; c.dispatchEvent(new Event('input'))", selector, value)
+
+    def test_every_kind_and_size_of_light(self):
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("ray_traced"))
+        self.change(lambda: self.set_number("#technique_a [name=samples]", 4))
+        sizes = {"directional": ["angular_diameter_deg"], "sphere": ["radius"], "point": [], "rectangle": ["width", "height"]}
+        for kind, names in sizes.items():
+            self.change(lambda: Select(self.find("[name=light_kind]")).select_by_value(kind))
+            for name in names:
+                before = self.mask()["digest"]
+                self.change(lambda: self.set_number(f"[name=light_{name}]", 2.5))
+                self.assertNotEqual(before, self.mask()["digest"], name)
+            self.assertEqual(self.problem(), "", kind)
+
+    def test_a_light_that_a_technique_does_not_take_is_said_so(self):
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "#technique_a .notice"), [])
+        Select(self.find("[name=light_kind]")).select_by_value("sphere")
+        self.assertIn("takes no sphere light", self.find("#technique_a .notice").text)
+        self.wait_for("return !document.getElementById('problem').hidden")
+        self.assertIn("sphere", self.problem())
+        self.assertTrue(all("422" in error for error in self.console_errors()))
+
+    def test_techniques_switch_with_their_controls(self):
+        before = self.mask()["digest"]
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("ray_traced"))
+        self.assertNotEqual(before, self.mask()["digest"])
+        self.assertTrue(self.find("#technique_a [name=samples]").is_displayed())
+        described = self.js("return fetch('/v1/techniques').then((answer) => answer.json())")["techniques"]
+        listed = [option.get_attribute("value") for option in Select(self.find("#technique_a [name=kind]")).options]
+        self.assertEqual(listed, [technique["kind"] for technique in described])
+        for technique in described:
+            self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value(technique["kind"]))
+            names = self.js("return [...document.querySelectorAll('#technique_a [name]')].map((one) => one.name)")
+            self.assertEqual(sorted(names), sorted(technique["schema"]["properties"]))
+
+    def test_two_techniques_compared(self):
+        self.view("wipe")
+        self.wait_for_b()
+        both = self.mask()
+        self.set_number("#wipe", 0)
+        b = self.mask()
+        self.set_number("#wipe", 100)
+        a = self.mask()
+        self.assertEqual(len({both["digest"], a["digest"], b["digest"]}), 3)
+        figures = self.find("#figures").text
+        for word in ("MAE", "RMSE", "Bias", "Max", "99 %", "soft_shadow_map against ray_traced", "B  ray_traced"):
+            self.assertIn(word, figures)
+        mae = float(re.search(r"MAE\s+(\S+)", figures)[1])
+        self.assertTrue(0.001 < mae < 0.2, mae)
+        self.assertEqual(a["coloured"], 0)
+        self.view("difference")
+        self.wait_for_b()
+        self.assertGreater(self.mask()["coloured"], 0.01)
+        self.assertTrue(self.find("#legend").is_displayed())
+        self.screenshot("page_difference.png")
+
+    def test_the_light_orbits_and_the_rate_is_shown(self):
+        self.find("#orbit").click()
+        time.sleep(3)
+        rate = self.wait_for("return document.getElementById('rate').textContent")
+        self.find("#orbit").click()
+        self.assertEqual(self.find("#orbit").get_attribute("aria-pressed"), "false")
+        print(f"  512 x 512, occluder map 384 x 384, beside the other tests: {rate}", flush=True)
+        self.assertGreater(float(rate.split()[0]), 0)
+
+    def test_a_dropped_depth_pass_is_lit(self):
+        self.penumbra("depth", EXAMPLES / "04_relight_depth_view.json", "--out", self.folder / "view")
+        self.change(lambda: self.drop(self.folder / "view" / "receiver.exr"))
+        mask = self.mask()
+        self.assertEqual(mask["size"], [256, 256])
+        self.assert_shadowed(mask)
+        self.assertEqual(self.problem(), "")
+        self.assertIn("-F receiver.exr=@receiver.exr", self.find("#curl_line").text)
+        # The eye is 9 from the target; the median of what it sees is near that.
+        scene = self.scene_file()
+        self.assertTrue(7 < -scene["receivers"]["camera"]["target"][2] < 11, scene["receivers"])
+        self.assertEqual(scene["objects"][0]["depth"], "receiver.exr")
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
+        self.assertNotEqual(mask["digest"], self.mask()["digest"])
+        # The scene file that the page shows is one that the command line takes.
+        (self.folder / "view" / "page.json").write_text(json.dumps(scene))
+        self.penumbra("mask", self.folder / "view" / "page.json", "-o", self.folder / "page.pfm")
+
+    def scene_file(self):
+        self.js("document.querySelector('#share details').open = true")
+        return json.loads(self.wait_for("return document.getElementById('scene_text').textContent"))
+
+    def test_maps_seen_from_a_light_change_its_size_only(self):
+        self.penumbra("depth", EXAMPLES / "square.json", "--out", self.folder / "square")
+        names = sorted(path.name for path in (self.folder / "square").glob("*.exr"))
+        front = next(name for name in names if "front" in name)
+        receiver = next(name for name in names if "recei" in name)
+        self.change(lambda: self.drop(self.folder / "square" / front, self.folder / "square" / receiver))
+        self.assertEqual(self.problem(), "")
+        self.assertIn("Only the size can change", self.find("#fixed_light").text)
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "#light_pad"), [])
+        self.assertFalse(self.find("#orbit").is_enabled())
+        before = self.mask()
+        self.assert_shadowed(before)
+        self.change(lambda: self.set_number("[name=light_height]", 2.5))
+        self.assertNotEqual(before["digest"], self.mask()["digest"])
+
+    def test_picked_files_do_as_dropped_ones(self):
+        self.penumbra("depth", EXAMPLES / "04_relight_depth_view.json", "--out", self.folder / "picked")
+        Select(self.find("[name=source]")).select_by_value("camera")
+        self.find("#file_depth").send_keys(str(self.folder / "picked" / "receiver.exr"))
+        distance = self.find("[name=distance]")
+        distance.clear()
+        distance.send_keys("9")
+        self.change(lambda: self.find("#source .primary").click())
+        self.assertEqual(self.mask()["size"], [256, 256])
+        self.assertEqual(self.scene_file()["receivers"]["camera"]["target"], [0, 0, -9])
+
+    def test_a_bad_file_shows_what_the_service_says(self):
+        bad = self.folder / "broken.exr"
+        bad.write_bytes(b"\x76\x2f\x31\x01 no image follows")
+        self.drop(bad)
+        self.wait_for("return !document.getElementById('problem').hidden")
+        self.assertIn("broken.exr", self.problem())
+        self.assertTrue(all("422" in error or "400" in error for error in self.console_errors()))
+        # The page goes on.
+        self.change(lambda: Select(self.find("[name=source]")).select_by_value("courtyard"))
+        self.assertEqual(self.problem(), "")
+
+    def test_downloads_have_the_formats_that_they_say(self):
+        heads = self.module(
+            """
+            const [{Client}, scenes, {FORMATS}] = await Promise.all(["client", "scene", "share_panel"].map(page));
+            const source = scenes.courtyard_source(), client = new Client(), heads = {};
+            for (const format of FORMATS) {
+                const {buffer} = await client.mask(scenes.scene_json(source, source.light, {kind: "shadow_map", settings: {}}), source.files, format.media_type);
+                heads[format.extension] = [...new Uint8Array(buffer).slice(0, 26)];
+            }
+            return heads;
+            """
+        )
+        self.assertEqual(bytes(heads["png"][:8]), b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(heads["png"][24], 16)  # bits a sample
+        self.assertEqual(bytes(heads["exr"][:4]), b"\x76\x2f\x31\x01")
+        self.assertIn(bytes(heads["tif"][:4]), (b"II*\0", b"MM\0*"))
+        self.assertEqual(bytes(heads["pfm"][:2]), b"Pf")
+
+    def test_a_kept_scene_that_is_gone_is_sent_again(self):
+        kept = self.module(
+            """
+            const [{Client}, scenes] = await Promise.all(["client", "scene"].map(page));
+            const source = scenes.courtyard_source(), client = new Client();
+            const scene = scenes.scene_json(source, source.light, {kind: "shadow_map", settings: {}});
+            const ask = async () => new Uint8Array((await client.mask(scene, source.files, "image/x-portable-floatmap")).buffer);
+            const first = await ask();
+            const sent = performance.getEntriesByType("resource").map((entry) => entry.name).filter((name) => name.includes("/v1/scenes/"));
+            const removed = (await fetch(new URL(sent.at(-1)).pathname.replace(/\\/masks$/, ""), {method: "DELETE"})).status;
+            const second = await ask();
+            return {keeps: client.keeps, removed, same: first.every((byte, i) => byte === second[i])};
+            """
+        )
+        self.assertEqual(kept, {"keeps": True, "removed": 204, "same": True})
+        self.assertTrue(all("404" in error for error in self.console_errors()))
+
+    def test_nothing_is_asked_of_another_host(self):
+        self.view("wipe")
+        self.wait_for_b()
+        asked = self.requests()
+        self.assertGreater(len(asked), 10)
+        for address in asked:
+            self.assertTrue(address.startswith((self.server.url + "/", "blob:" + self.server.url, "data:", "about:", "chrome:")), address)
+
+    def test_every_control_has_a_name_and_takes_the_focus(self):
+        self.view("wipe")
+        self.js("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        nodes = self.browser.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+        controls = [node for node in nodes if node.get("role", {}).get("value") in
+                    ("button", "slider", "spinbutton", "combobox", "checkbox", "radio", "textbox", "application") and not node.get("ignored")]
+        self.assertGreater(len(controls), 25)
+        for node in controls:
+            self.assertTrue(node.get("name", {}).get("value"), node)
+        unreachable = self.js("return [...document.querySelectorAll('input, select, button, canvas.pad')].filter((one) => one.tabIndex < 0).length")
+        self.assertEqual(unreachable, 0)
+
+    def test_it_fits_narrow_and_wide(self):
+        for width, dark in ((360, False), (360, True), (1440, False)):
+            self.resize(width, 800, dark)
+            for mode in ("mask", "wipe"):
+                self.view(mode)
+                self.assertLessEqual(self.js("return document.documentElement.scrollWidth"), width)
+            if width == 360:
+                self.screenshot("page_narrow_dark.png" if dark else "page_narrow.png")
+
+
+class Token(PageTest):
+    def setUp(self):
+        pass
+
+    def test_a_token_is_asked_for_and_used(self):
+        secret = "a-token-of-the-test-only"
+        server = Server(PENUMBRA_SERVER_TOKEN=secret)
+        self.addCleanup(server.stop)
+        self.browser.get(server.url + "/")
+        self.wait_for("return !document.getElementById('token_form').hidden")
+        self.assertTrue(all("401" in error for error in self.console_errors()))
+        field = self.browser.find_element(By.ID, "token")
+        field.send_keys(secret + Keys.ENTER)
+        self.wait_for("return document.getElementById('mask').dataset.version")
+        self.assertEqual(self.problem(), "")
+        self.assertEqual(self.js("return JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"), '[{},{},""]')
+        self.assertNotIn(secret, self.js("return document.body.textContent"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
