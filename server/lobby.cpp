@@ -21,6 +21,9 @@ constexpr std::size_t forget_bytes = std::size_t{4} << 20;
 // Answers that wait for their clients, together. Above it the one that waits longest is given up.
 constexpr std::uint64_t max_waiting_bytes = std::uint64_t{256} << 20;
 
+// How long headers may take when somebody else needs the place.
+constexpr std::chrono::seconds patience{1};
+
 constexpr std::chrono::milliseconds tick{50}; // how late a deadline may be noticed
 
 // The end of the headers: the first line that is only CR LF, as the HTTP library's parser sees it (it skips lines that end in LF alone).
@@ -56,8 +59,12 @@ Lobby::~Lobby()
 
 void Lobby::arrive(int socket)
 {
-    const std::scoped_lock lock(mutex_);
-    if (guests_.size() >= places_) make_room();
+    std::unique_lock lock(mutex_);
+    while (guests_.size() + served_ >= places_ && !make_room()) {
+        lock.unlock();
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        lock.lock();
+    }
     Guest guest;
     guest.begun = guest.phase_begun = Clock::now();
     guests_.emplace(socket, std::move(guest));
@@ -66,12 +73,12 @@ void Lobby::arrive(int socket)
 
 void Lobby::leave(int socket, std::string rest, bool unread)
 {
+    const std::scoped_lock lock(mutex_);
+    --served_;
     if (rest.empty() && !unread) {
         ::close(socket);
         return;
     }
-    const std::scoped_lock lock(mutex_);
-    if (guests_.size() >= places_) make_room();
     Guest guest;
     guest.phase = Phase::sending;
     guest.begun = guest.phase_begun = Clock::now();
@@ -105,7 +112,7 @@ void Lobby::wait_for_leaving()
 std::size_t Lobby::connections() const
 {
     const std::scoped_lock lock(mutex_);
-    return guests_.size();
+    return guests_.size() + served_;
 }
 
 bool Lobby::any(Phase phase) const
@@ -193,6 +200,7 @@ void Lobby::hand_over(Guests::iterator guest, bool timed_out, bool ended)
     if ((timed_out || ended) && arrival.bytes.find('\n') == std::string::npos) return close(guest);
     epoll_ctl(events_, EPOLL_CTL_DEL, guest->first, nullptr);
     guests_.erase(guest);
+    ++served_;
     serve_(std::move(arrival));
 }
 
@@ -212,21 +220,31 @@ void Lobby::end_late(Clock::time_point now)
         else
             close(guest);
     }
-    while (waiting_bytes_ > max_waiting_bytes) make_room();
+    while (waiting_bytes_ > max_waiting_bytes) give_up_an_answer();
 }
 
-void Lobby::make_room()
+bool Lobby::make_room()
 {
-    // Headers come within milliseconds from clients that mean it, so the oldest that waits for them is the least loss; while answers are
-    // too many, only giving up answers helps.
-    const bool answers = waiting_bytes_ > max_waiting_bytes;
-    const auto loss = [&](const Guest& guest) {
-        return answers ? guest.phase != Phase::sending : guest.phase == Phase::headers ? 0 : guest.phase == Phase::forgetting ? 1 : 2;
-    };
-    const auto least = std::ranges::min_element(guests_, [&](const auto& a, const auto& b) {
-        return std::pair(loss(a.second), a.second.phase_begun) < std::pair(loss(b.second), b.second.phase_begun);
-    });
-    if (least != guests_.end()) close(least);
+    // Clients that mean it send their headers at once, so the oldest that does not is the least loss.
+    const auto now = Clock::now();
+    auto oldest = guests_.end();
+    for (auto guest = guests_.begin(); guest != guests_.end(); ++guest) {
+        const bool may_go = guest->second.phase == Phase::forgetting ||
+                            (guest->second.phase == Phase::headers && now - guest->second.phase_begun >= patience);
+        if (may_go && (oldest == guests_.end() || guest->second.phase_begun < oldest->second.phase_begun)) oldest = guest;
+    }
+    if (oldest == guests_.end()) return false;
+    close(oldest);
+    return true;
+}
+
+void Lobby::give_up_an_answer()
+{
+    auto oldest = guests_.end();
+    for (auto guest = guests_.begin(); guest != guests_.end(); ++guest)
+        if (guest->second.phase == Phase::sending && (oldest == guests_.end() || guest->second.phase_begun < oldest->second.phase_begun))
+            oldest = guest;
+    close(oldest); // there is one: bytes wait
 }
 
 void Lobby::close(Guests::iterator guest)

@@ -41,13 +41,14 @@ public:
     // `serve` gets each socket with its bytes, from the lobby's thread; it must not block.
     using Serve = std::function<void(Arrival)>;
 
-    // More than `connections` at a time push out the oldest that has no whole headers, else that is being forgotten, else that is slowest
-    // to take its answer.
+    // No more than `connections` are open at a time, those that are served included. One more pushes out the oldest that has waited for its
+    // headers for a second, or that is being forgotten; when there is none, it waits where the kernel keeps it.
     Lobby(std::size_t connections, Clock::duration header_time, Serve serve);
     ~Lobby();
     Lobby(const Lobby&) = delete;
     Lobby& operator=(const Lobby&) = delete;
 
+    // Waits for a place.
     void arrive(int socket);
     // Sends `rest`, ends its own side, then reads and forgets what the client still sends when `unread`; closes.
     void leave(int socket, std::string rest, bool unread);
@@ -57,7 +58,7 @@ public:
     // Returns when all have left.
     void wait_for_leaving();
 
-    std::size_t connections() const; // those that are here now
+    std::size_t connections() const; // those that are open
 
 private:
     enum class Phase { headers, sending, forgetting };
@@ -78,7 +79,8 @@ private:
     void begin_forgetting(Guests::iterator guest);
     void hand_over(Guests::iterator guest, bool timed_out, bool ended);
     void end_late(Clock::time_point now);
-    void make_room();
+    bool make_room();
+    void give_up_an_answer();
     void close(Guests::iterator guest);
     void watch(int socket, Phase phase, bool already);
     bool any(Phase phase) const;
@@ -89,6 +91,7 @@ private:
     const int events_;
     mutable std::mutex mutex_;
     Guests guests_;
+    std::size_t served_ = 0;          // handed over and not back
     std::uint64_t waiting_bytes_ = 0; // of answers
     bool ending_ = false;
     std::thread thread_;
