@@ -8,14 +8,23 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <httplib.h>
 
 #include "gate.hpp"
 #include "lobby.hpp"
+#include "trace_context.hpp"
 
 namespace penumbra::server {
+
+// What a request took, for its log line; 0 where it did not get there.
+struct RequestCost {
+    std::string technique;
+    std::uint64_t bytes_in = 0;
+    double upload_ms = 0, queue_ms = 0, decode_ms = 0, compute_ms = 0, encode_ms = 0;
+};
 
 class Connection final : public httplib::Stream {
 public:
@@ -47,6 +56,9 @@ public:
 
     // Of the request, for its handler and its log line. `reason` and `inside`: why it was refused, for metrics and for the log alone.
     std::string content_type, request_id, reason, inside;
+    std::optional<TraceContext> trace;
+    std::string span_id;
+    RequestCost cost;
     Deadline::Clock::time_point begun;
 
 private:

@@ -125,6 +125,12 @@ std::string boundary_of(std::string_view content_type)
     return boundary;
 }
 
+bool is_json(std::string_view content_type)
+{
+    const std::string_view kind = first_word(content_type);
+    return same(kind, "application/json") || same(kind, "application/merge-patch+json");
+}
+
 bool is_part_name(std::string_view name)
 {
     return !name.empty() && name.size() <= 128 && name.front() != '.' && std::ranges::all_of(name, [](char c) {

@@ -17,6 +17,9 @@ struct Part {
 // The boundary of a Content-Type. Throws Problem 415 for another type, 400 for a boundary that is missing or not allowed.
 std::string boundary_of(std::string_view content_type);
 
+// Whether that is JSON, as it stands or as a merge patch (RFC 7396).
+bool is_json(std::string_view content_type);
+
 // A name that a part may have: 1 to 128 of A-Z a-z 0-9 . _ - and no . at the start. No path is one.
 bool is_part_name(std::string_view name);
 

@@ -18,6 +18,8 @@ struct Options {
     std::string device;
     std::string token;
     bool allow_meshes = false;
+    std::string names = {};   // further names of this service, for Host
+    std::string origins = {}; // further origins whose pages may use it
 
     // Limits of one request.
     std::int64_t body_bytes = std::int64_t{64} << 20;
@@ -35,6 +37,9 @@ struct Options {
     std::int64_t queue = 16;
     std::int64_t io_threads = 32;
     std::int64_t drain_s = 0;
+    std::int64_t scenes = 64;
+    std::int64_t scenes_bytes = std::int64_t{1} << 30;
+    std::int64_t scenes_s = 600;
 };
 
 struct WholeNumbers {

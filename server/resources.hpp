@@ -5,6 +5,8 @@
 #include <span>
 #include <string>
 
+#include <penumbra/error.hpp>
+
 #include "gate.hpp"
 #include "io/scene_file.hpp"
 #include "multipart.hpp"
@@ -28,11 +30,19 @@ public:
     std::string path(const std::string& name) const override;
     std::uint64_t max_samples() const override { return static_cast<std::uint64_t>(options_.image_samples); }
 
-    // Where meshes lie; empty when there are none. Not to be shown.
-    const std::filesystem::path& folder() const { return folder_; }
+    // What `call` gives; what it throws names no file: a mesh reader's complaint may name the temporary one that we gave it.
+    template <class Call> auto without_paths(Call&& call) const
+    {
+        try {
+            return call();
+        } catch (const Error& error) {
+            throw without_paths(error);
+        }
+    }
 
 private:
     std::string_view use(const std::string& name) const;
+    Error without_paths(const Error& error) const;
 
     std::span<const Part> parts_;
     const Options& options_;

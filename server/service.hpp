@@ -4,14 +4,18 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <penumbra/engine.hpp>
 
 #include "gate.hpp"
 #include "metrics.hpp"
+#include "multipart.hpp"
 #include "options.hpp"
+#include "scene_store.hpp"
 
 namespace httplib {
 struct Request;
@@ -20,6 +24,8 @@ class ContentReader;
 } // namespace httplib
 
 namespace penumbra::server {
+
+struct Route;
 
 class Service {
 public:
@@ -42,21 +48,43 @@ public:
 
 private:
     class Http;
+    using Request = httplib::Request;
+    using Response = httplib::Response;
+    using Reader = httplib::ContentReader;
+
+    // service_checks.cpp: throw Problem for what is refused before its body is read.
+    void check(const Request& request) const;
+    void check_browser(const Request& request) const;
+    void check_token(const Request& request) const;
+    void check_body_headers(const Request& request, const Route& route) const;
+
+    // service_masks.cpp: what computes.
+    std::string read_body(const Request& request, const Reader& reader) const;
+    void post_mask(const Request& request, Response& response, const Reader& reader);
+    void post_scene(const Request& request, Response& response, const Reader& reader);
+    void post_kept_mask(const Request& request, Response& response, const Reader& reader);
+    void get_scene(const Request& request, Response& response);
+    void delete_scene(const Request& request, Response& response);
+    Gate::Guard enter_slot();
+    void send_mask(Response& response, const MaskTask& task, const MaskFormat& format);
+    std::string describe(const KeptScene& scene);
+
+    // service_routes.cpp
     void set_routes();
-    void check(const httplib::Request& request) const; // throws Problem for what is refused before its body is read
-    void check_body_headers(const httplib::Request& request) const;
-    void post_mask(const httplib::Request& request, httplib::Response& response, const httplib::ContentReader& reader);
-    std::string metrics_text() const;
-    void finished(const httplib::Request& request, const httplib::Response& response);
+    void set_documents();
+    void ready(Response& response) const;
+    std::string metrics_text();
+    void finished(const Request& request, const Response& response);
 
     const Options options_;
     const Engine engine_;
     const Log log_;
     Gate gate_;
+    SceneStore scenes_;
     mutable Metrics metrics_;
-    const std::string techniques_, devices_, openapi_, id_prefix_;
+    const std::string id_prefix_;
     std::atomic<bool> warm_ = false, draining_ = false, stopped_ = false;
-    std::atomic<std::uint64_t> requests_ = 0;
+    std::atomic<std::uint64_t> requests_ = 0, peak_device_bytes_ = 0;
     const double started_s_;
     std::unique_ptr<Http> http_;
 };

@@ -10,7 +10,6 @@
 #include "io/scene_parts.hpp"
 
 namespace penumbra {
-
 namespace {
 
 SettingValue read_setting(const JsonValue& value)
@@ -22,6 +21,13 @@ SettingValue read_setting(const JsonValue& value)
     if (json.is_string()) return value.text();
     throw value.expected("true, false, a number or a string");
 }
+
+bool has_images(const Scene& scene)
+{
+    return scene.occluders.front || scene.occluders.back || !scene.occluders.layers.empty() || scene.receivers.depth;
+}
+
+} // namespace
 
 TechniqueRequest parse_technique(const JsonValue& value)
 {
@@ -45,13 +51,6 @@ OutputFormat parse_output(const JsonValue& value)
         throw value.error(error.message(), error.hint());
     }
 }
-
-bool has_images(const Scene& scene)
-{
-    return scene.occluders.front || scene.occluders.back || !scene.occluders.layers.empty() || scene.receivers.depth;
-}
-
-} // namespace
 
 Bytes FileResources::bytes(const std::string& name) const { return Bytes(read_file(path(name), name)); }
 

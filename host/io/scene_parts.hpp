@@ -31,6 +31,10 @@ DepthMap load_depth(const JsonValue& name, const MapEncoding& encoding, const Ca
 Occluders parse_occluders(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);
 Receivers parse_receivers(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);
 
+// Technique and output (scene_file.cpp).
+TechniqueRequest parse_technique(const JsonValue& value);
+OutputFormat parse_output(const JsonValue& value);
+
 // Objects (scene_objects.cpp).
 Object parse_object(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);
 

@@ -100,7 +100,7 @@ inline Reply ask(int port, std::string_view request)
 
 inline Reply get(int port, const std::string& path, const std::string& headers = {})
 {
-    return ask(port, "GET " + path + " HTTP/1.1\r\nHost: x\r\n" + headers + "\r\n");
+    return ask(port, "GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n");
 }
 
 // --- Requests ----------------------------------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ inline std::string form(const Parts& parts)
 
 inline std::string head(const std::string& headers, const std::string& type = "multipart/form-data; boundary=B")
 {
-    return "POST /v1/masks HTTP/1.1\r\nHost: x\r\nContent-Type: " + type + "\r\n" + headers + "\r\n";
+    return "POST /v1/masks HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: " + type + "\r\n" + headers + "\r\n";
 }
 inline std::string length_of(const std::string& body) { return "Content-Length: " + std::to_string(body.size()) + "\r\n"; }
 

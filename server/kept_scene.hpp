@@ -1,0 +1,61 @@
+// A scene as it was sent, kept so that light, receivers and technique can change without sending it again.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <penumbra/engine.hpp>
+
+#include "gate.hpp"
+#include "mask_cache.hpp"
+#include "masks.hpp"
+#include "multipart.hpp"
+#include "options.hpp"
+
+namespace penumbra::server {
+
+// The name of what was sent: SHA-256 of the scene's JSON and of every part.
+std::string id_of(std::span<const Part> parts);
+
+// Safe to use from several threads at once.
+class KeptScene {
+public:
+    // Copies and decodes the parts. Throws what decoding throws.
+    KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline);
+
+    const std::string& id() const { return id_; }
+    const std::vector<std::string>& warnings() const { return scene_.warnings; }
+    std::uint64_t bytes() const; // all that it holds now, on the device as well
+    std::uint64_t device_bytes() const { return cache_.device_bytes(); }
+    void forget_results() const { cache_.clear(); }
+
+    // Names what a task of that patch and those parts depends on.
+    std::string content_of(std::string_view patch, std::span<const Part> extra) const;
+
+    // What to compute a mask from: the scene with `patch` (scene_patch.hpp), an empty one to take it as it stands. The images that the
+    // patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.
+    MaskTask task(std::string_view patch, std::span<const Part> extra, const Options& options, const Deadline& deadline) const;
+
+private:
+    // What decides whether a kept piece still holds.
+    struct Changes;
+    void check_objects(const Changes& changes) const;
+
+    const std::string id_;
+    std::vector<std::pair<std::string, std::string>> owned_; // names and bytes of the parts
+    std::vector<Part> parts_;                                // views of owned_
+    nlohmann::json document_;
+    Scene scene_; // decoded; without what the pointers below hold
+    std::shared_ptr<const Occluders> occluders_;
+    std::shared_ptr<const Receivers> receivers_;
+    Geometry geometry_;
+    mutable MaskCache cache_;
+};
+
+} // namespace penumbra::server

@@ -1,0 +1,22 @@
+// Changing a scene's JSON: a JSON Merge Patch (RFC 7396) of the sections that may change while objects and images stay.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+namespace penumbra::server {
+
+// `scene` with `patch` merged in. A light, camera or technique whose `kind` differs from the one before replaces it instead: keys of one
+// kind mean nothing to another. Throws invalid_input for other sections than light, receivers, technique and output, naming them.
+nlohmann::json patched(const nlohmann::json& scene, const nlohmann::json& patch);
+
+// Whether a string in `json`, at any depth, is one of `names`.
+bool mentions(const nlohmann::json& json, std::span<const std::string_view> names);
+
+// Whether one of the objects hangs on the light's own view (its camera is of kind light).
+bool objects_follow_light(const nlohmann::json& scene);
+
+} // namespace penumbra::server

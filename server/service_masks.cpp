@@ -1,0 +1,187 @@
+// The calls that compute: masks of scenes that come along, and of scenes that are kept.
+#include <algorithm>
+#include <optional>
+
+#include <nlohmann/json.hpp>
+
+#include "answer.hpp"
+#include "mask_format.hpp"
+#include "masks.hpp"
+#include "service_http.hpp"
+#include "work_limits.hpp"
+
+namespace penumbra::server {
+namespace {
+
+Problem no_scene()
+{
+    return Problem(404, "no_scene", "there is no scene of this id, or it is kept no longer; POST /v1/scenes keeps it again");
+}
+
+// The id in the path, which the checks have looked at.
+std::string_view id_in(const httplib::Request& request)
+{
+    constexpr std::size_t before = sizeof("/v1/scenes/") - 1;
+    return std::string_view(request.path).substr(before, 64);
+}
+
+// Whether the client has that mask already; then the answer is 304.
+bool has_it(const httplib::Request& request, httplib::Response& response, const std::string& tag)
+{
+    response.set_header("ETag", tag);
+    response.set_header("Cache-Control", "private, no-cache");
+    if (!names_tag(request.get_header_value("If-None-Match"), tag)) return false;
+    response.status = 304;
+    return true;
+}
+
+} // namespace
+
+// The body, whole, never more than announced and allowed. What is reserved costs nothing before it is written to.
+std::string Service::read_body(const Request& request, const Reader& reader) const
+{
+    Connection& connection = Connection::current();
+    const auto uploading = Deadline::Clock::now();
+    std::string body;
+    const std::size_t length = static_cast<std::size_t>(length_from(request.get_header_value("Content-Length")).value_or(0));
+    body.reserve(length);
+    const bool whole = length == 0 || reader([&](const char* data, std::size_t size) {
+                           if (size > length - body.size()) return false;
+                           body.append(data, size);
+                           return true;
+                       });
+    if (connection.too_slow())
+        throw Problem(408, "slow_body",
+                      "the body came at less than " + std::to_string(slowest_transfer) + " bytes a second, " +
+                          std::to_string(transfer_grace.count()) + " s after its begin");
+    if (connection.timed_out())
+        throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
+    if (!whole || body.size() != length)
+        throw Problem(400, "short_body",
+                      "the body ended after " + std::to_string(body.size()) + " of " + std::to_string(length) + " bytes");
+    const double upload_s = seconds_since(uploading);
+    connection.cost.bytes_in = length;
+    connection.cost.upload_ms = upload_s * 1000;
+    metrics_.observe("penumbra_upload_seconds", "", upload_s);
+    return body;
+}
+
+Gate::Guard Service::enter_slot()
+{
+    const auto waiting = Deadline::Clock::now();
+    Gate::Guard slot = gate_.enter(Connection::current().request());
+    const double wait_s = seconds_since(waiting);
+    Connection::current().cost.queue_ms = wait_s * 1000;
+    metrics_.observe("penumbra_queue_wait_seconds", "", wait_s);
+    return slot;
+}
+
+void Service::post_mask(const Request& request, Response& response, const Reader& reader)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const std::string body = read_body(request, reader);
+    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+    if (has_it(request, response, etag_of(engine_, id_of(parts), format))) return;
+
+    const auto slot = enter_slot();
+    const auto decoding = Deadline::Clock::now();
+    const MaskTask task = task_of(parts, options_, connection.request());
+    connection.cost.decode_ms = seconds_since(decoding) * 1000;
+    send_mask(response, task, format);
+}
+
+void Service::post_scene(const Request& request, Response& response, const Reader& reader)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const std::string body = read_body(request, reader);
+    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+    if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
+    const std::string id = id_of(parts);
+    auto scene = scenes_.find(id, true);
+    response.status = scene ? 200 : 201;
+    if (!scene) {
+        const auto slot = enter_slot();
+        const auto decoding = Deadline::Clock::now();
+        scene = std::make_shared<KeptScene>(id, parts, options_, connection.request());
+        const MaskTask task = scene->task({}, {}, options_, connection.request());
+        connection.cost.decode_ms = seconds_since(decoding) * 1000;
+        check_work(*task.occluders, *task.receivers, task.technique, options_);
+        prepare(engine_, task, connection.request());
+        scenes_.keep(scene);
+    }
+    response.set_header("Location", "/v1/scenes/" + id);
+    response.set_content(describe(*scene), "application/json");
+}
+
+void Service::post_kept_mask(const Request& request, Response& response, const Reader& reader)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const auto scene = scenes_.find(id_in(request), true);
+    if (!scene) throw no_scene();
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const std::string body = read_body(request, reader);
+    std::vector<Part> parts;
+    std::string_view patch = body;
+    if (!body.empty() && !is_json(connection.content_type)) {
+        parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+        const Part* const part = find_scene(parts, options_);
+        patch = part ? part->bytes : std::string_view();
+    }
+    if (has_it(request, response, etag_of(engine_, scene->content_of(patch, parts), format))) return;
+
+    const auto slot = enter_slot();
+    const auto decoding = Deadline::Clock::now();
+    const MaskTask task = scene->task(patch, parts, options_, connection.request());
+    connection.cost.decode_ms = seconds_since(decoding) * 1000;
+    send_mask(response, task, format);
+    scenes_.tidy();
+}
+
+void Service::send_mask(Response& response, const MaskTask& task, const MaskFormat& format)
+{
+    RequestCost& cost = Connection::current().cost;
+    MaskReply reply = compute_mask(engine_, task, format, options_, Connection::current().request());
+    cost.technique = reply.technique;
+    cost.compute_ms = reply.compute_ms;
+    cost.encode_ms = reply.encode_ms;
+    metrics_.observe("penumbra_decode_seconds", "", cost.decode_ms / 1000);
+    metrics_.observe("penumbra_compute_seconds", "technique=\"" + reply.technique + "\"", cost.compute_ms / 1000);
+    metrics_.observe("penumbra_encode_seconds", "format=\"" + std::string(format.format) + "\"", cost.encode_ms / 1000);
+    metrics_.count("penumbra_pixels_total", "", static_cast<double>(reply.pixels));
+    std::uint64_t peak = peak_device_bytes_;
+    while (reply.device_bytes > peak && !peak_device_bytes_.compare_exchange_weak(peak, reply.device_bytes)) {
+    }
+
+    reply.stages.insert(reply.stages.begin(), {{"upload", cost.upload_ms}, {"queue", cost.queue_ms}, {"decode", cost.decode_ms}});
+    response.status = 200;
+    response.set_header("Server-Timing", server_timing(reply.stages));
+    if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
+    response.body = std::move(reply.bytes);
+    response.set_header("Content-Type", std::string(format.media_type));
+}
+
+std::string Service::describe(const KeptScene& scene)
+{
+    const nlohmann::ordered_json json = {
+        {"id", scene.id()}, {"expires_s", scenes_.seconds_left(scene.id())}, {"bytes", scene.bytes()}, {"warnings", scene.warnings()}};
+    return json.dump(2, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+void Service::get_scene(const Request& request, Response& response)
+{
+    const auto scene = scenes_.find(id_in(request), false);
+    if (!scene) throw no_scene();
+    response.set_content(describe(*scene), "application/json");
+}
+
+void Service::delete_scene(const Request& request, Response& response)
+{
+    if (!scenes_.forget(id_in(request))) throw no_scene();
+    response.status = 204;
+}
+
+} // namespace penumbra::server

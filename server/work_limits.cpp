@@ -1,0 +1,65 @@
+#include "work_limits.hpp"
+
+#include <array>
+#include <cstdio>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include <penumbra/error.hpp>
+
+#include "technique/occluder_maps.hpp"
+
+namespace penumbra::server {
+namespace {
+
+std::string side_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+void check_pixels(std::string_view where, int width, int height, std::int64_t limit)
+{
+    if (static_cast<std::int64_t>(width) * height > limit)
+        throw Error(ErrorCode::too_large, std::string(where) + ": is " + side_text(width, height),
+                    "the limit of the service is " + std::to_string(limit) + " pixels");
+}
+
+void check_amount(std::string_view where, double amount, std::string_view what, std::int64_t limit)
+{
+    if (amount <= static_cast<double>(limit)) return;
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.3g", amount);
+    throw Error(ErrorCode::too_large, std::string(where) + ": asks for " + text.data() + " " + std::string(what),
+                "the limit of the service is " + std::to_string(limit));
+}
+
+struct WorkCheck {
+    const Occluders& occluders;
+    const Receivers& receivers;
+    const Options& options;
+    double pixels() const { return static_cast<double>(receivers.width) * receivers.height; }
+
+    void operator()(const ShadowMap&) const {}
+    void operator()(const SoftShadowMap& settings) const
+    {
+        const MapSize map = reduced_size(occluders.width, occluders.height, settings.resolution);
+        const double texels = static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
+        if (settings.project)
+            check_pixels("technique.project_resolution", settings.project_resolution, settings.project_resolution, options.receivers);
+        const double points = settings.project ? static_cast<double>(settings.project_resolution) * settings.project_resolution : pixels();
+        check_amount("receivers.resolution", texels * points, "pairs of occluder texel and receiver", options.pairs);
+    }
+    void operator()(const RayTraced& settings) const
+    {
+        check_amount("technique.samples", pixels() * settings.samples, "rays", options.rays);
+    }
+};
+
+} // namespace
+
+void check_work(const Occluders& occluders, const Receivers& receivers, const Technique& technique, const Options& options)
+{
+    check_pixels("receivers.resolution", receivers.width, receivers.height, options.receivers);
+    check_pixels("occluders.resolution", occluders.width, occluders.height, options.image_samples);
+    std::visit(WorkCheck{occluders, receivers, options}, technique);
+}
+
+} // namespace penumbra::server
