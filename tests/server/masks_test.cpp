@@ -32,7 +32,6 @@ Image library_mask(const Parts& all)
     return engine.mask(parse_scene(all.front().second, PartResources(all))).visibility;
 }
 
-// EXR and TIFF files carry the time of writing, so pixels are compared.
 std::vector<float> pixels_of(std::string_view file)
 {
     return decode_image(std::as_bytes(std::span(file.data(), file.size())), "reply").pixels;
@@ -58,7 +57,7 @@ TEST(Masks, EveryAcceptGivesTheLibrarysMask)
         const Reply reply = ask(shared_port(), post(form(parts()), accept));
         ASSERT_EQ(reply.status, 200) << reply.head << reply.body;
         EXPECT_EQ(reply.header("Content-Type"), format.type);
-        EXPECT_EQ(pixels_of(reply.body), pixels_of(text_of(encode_image(expected, {format.format, format.bits})))) << format.accept;
+        EXPECT_TRUE(reply.body == text_of(encode_image(expected, {format.format, format.bits}))) << format.accept;
         for (const char* stage : {"upload;dur=", "queue;dur=", "decode;dur=", "prepare;dur=", "shade;dur=", "encode;dur="})
             EXPECT_TRUE(holds(reply.header("Server-Timing"), stage)) << stage << " in " << reply.header("Server-Timing");
     }
