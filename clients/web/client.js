@@ -53,12 +53,22 @@ function form_of(scene, files) {
   return form;
 }
 
+/** The merge patch (RFC 7396) from a kept scene to `scene`. Members merge where the kind is the same, so what is at its default now is taken
+ * out; another kind replaces the object.
+ * @param {Json} scene @param {Json} kept technique of the kept scene */
+export function patch_of(scene, kept) {
+  const patch = Object.fromEntries(CHANGEABLE.filter((key) => key in scene).map((key) => [key, scene[key]]));
+  if (scene.technique.kind !== kept.kind) return patch;
+  const removed = Object.keys(kept).filter((key) => !(key in scene.technique));
+  return { ...patch, technique: { ...scene.technique, ...Object.fromEntries(removed.map((key) => [key, null])) } };
+}
+
 export class Client {
   /** The bearer token; in memory only. */
   token = "";
   /** False once the service has said that it keeps no scenes. */
   keeps = true;
-  /** @type {Map<string, string>} what is kept, by content */
+  /** What is kept, by content, and the technique that it was sent with. @type {Map<string, {id: string, technique: Json}>} */
   #kept = new Map();
   /** @type {WeakMap<Blob, number>} */
   #numbers = new WeakMap();
@@ -116,41 +126,40 @@ export class Client {
 
   /** @param {Json} scene @param {Files} files @param {string} accept */
   async #post_kept(scene, files, accept) {
-    const id = this.keeps ? await this.#keep(scene, files) : "";
-    if (id === "") return this.#post_whole(scene, files, accept);
-    const patch = Object.fromEntries(CHANGEABLE.filter((key) => key in scene).map((key) => [key, scene[key]]));
-    const changed = (/** @type {string} */ kept) =>
-      this.#fetch(`/v1/scenes/${kept}/masks`, {
+    const kept = this.keeps ? await this.#keep(scene, files) : null;
+    if (!kept) return this.#post_whole(scene, files, accept);
+    const change = (/** @type {{id: string, technique: Json}} */ { id, technique }) =>
+      this.#fetch(`/v1/scenes/${id}/masks`, {
         method: "POST",
-        body: JSON.stringify(patch),
+        body: JSON.stringify(patch_of(scene, technique)),
         headers: { Accept: accept, "Content-Type": "application/merge-patch+json" },
       });
     try {
-      return await changed(id);
+      return await change(kept);
     } catch (error) {
       if (!(error instanceof ServiceError && error.status === 404)) throw error;
       // Its time was over: send it again.
       this.#kept.delete(this.#key(scene, files));
-      return changed(await this.#keep(scene, files));
+      const again = await this.#keep(scene, files);
+      return again ? change(again) : this.#post_whole(scene, files, accept);
     }
   }
 
-  /** The kept scene's id; empty when the service keeps none.
+  /** The kept scene; null when the service keeps none.
    * @param {Json} scene @param {Files} files */
   async #keep(scene, files) {
     const key = this.#key(scene, files);
     const known = this.#kept.get(key);
-    if (known !== undefined) return known;
-    // Without settings: a patch of the same kind of technique then begins at the defaults, as one of another kind does.
-    const base = { ...scene, technique: { kind: scene.technique.kind } };
+    if (known) return known;
     try {
-      const { id } = await (await this.#fetch("/v1/scenes", { method: "POST", body: form_of(base, files) })).json();
-      this.#kept.set(key, id);
-      return /** @type {string} */ (id);
+      const { id } = await (await this.#fetch("/v1/scenes", { method: "POST", body: form_of(scene, files) })).json();
+      const kept = { id: /** @type {string} */ (id), technique: scene.technique };
+      this.#kept.set(key, kept);
+      return kept;
     } catch (error) {
       if (!(error instanceof ServiceError && (error.status === 404 || error.status === 405))) throw error;
       this.keeps = false;
-      return "";
+      return null;
     }
   }
 

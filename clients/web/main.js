@@ -13,7 +13,7 @@ import { RateMeter } from "./rate.js";
 import { courtyard_source, scene_json } from "./scene.js";
 import { save, SharePanel } from "./share_panel.js";
 import { SourcePanel } from "./source_panel.js";
-import { technique_panel } from "./technique_panel.js";
+import { suggested_choice, technique_panel } from "./technique_panel.js";
 import { View } from "./view.js";
 
 /** @typedef {import("./scene.js").Source} Source */
@@ -22,7 +22,7 @@ import { View } from "./view.js";
 
 const PFM = "image/x-portable-floatmap";
 /** What the page opens with, where the service knows it; else the service's first. */
-const FIRST = { a: { kind: "soft_shadow_map", settings: { sides: "both" } }, b: { kind: "ray_traced", settings: {} } };
+const FIRST = { a: "soft_shadow_map", b: "ray_traced" };
 /** The second mask follows the light at once when it takes less than this; else when the light has rested that long. */
 const FOLLOWS_MS = 150;
 
@@ -38,9 +38,9 @@ let techniques = [];
 let source = courtyard_source();
 let light = source.light;
 /** @type {Choice} */
-let a = FIRST.a;
+let a = { kind: FIRST.a, settings: {} };
 /** @type {Choice} */
-let b = FIRST.b;
+let b = { kind: FIRST.b, settings: {} };
 /** Counts changes: a mask belongs to one. */
 let version = 0;
 /** @type {{a: MaskReply | null, b: MaskReply | null, b_version: number}} */
@@ -172,11 +172,12 @@ const light_panel = new LightPanel(by_id("light"), (next) => {
 });
 
 function show_techniques() {
-  technique_panel(by_id("technique_a"), techniques, a, light.kind, (next) => {
+  const fits = { light: light.kind, suggested: source.suggested };
+  technique_panel(by_id("technique_a"), techniques, a, fits, (next) => {
     a = next;
     update();
   });
-  technique_panel(by_id("technique_b"), techniques, b, light.kind, (next) => {
+  technique_panel(by_id("technique_b"), techniques, b, fits, (next) => {
     b = next;
     shown.b = null;
     update();
@@ -202,9 +203,14 @@ function show_resolutions() {
 /** @param {Source} next */
 function use(next) {
   stop_orbit();
-  // What the bundled scene opens with does not suit every other: those begin with the technique's defaults.
-  if (next.kind !== "courtyard" && a === FIRST.a) a = { kind: a.kind, settings: {} };
   source = next;
+  // What suits the new source takes the place of what suited the last.
+  const suited = (/** @type {Choice} */ choice) => {
+    const own = Object.entries(choice.settings).filter(([key]) => !(key in next.suggested));
+    return { kind: choice.kind, settings: { ...Object.fromEntries(own), ...suggested_choice(techniques, choice.kind, next.suggested).settings } };
+  };
+  a = suited(a);
+  b = suited(b);
   light = next.light;
   view.b = shown.b = null;
   by_id("orbit").disabled = next.fixed_light !== "";
@@ -317,10 +323,10 @@ function wire() {
   });
 }
 
-/** A first choice that the service knows. @param {Choice} wanted @param {number} otherwise index in its list */
+/** A first choice that the service knows. @param {string} wanted @param {number} otherwise index in its list @returns {Choice} */
 function known(wanted, otherwise) {
-  if (techniques.some((one) => one.kind === wanted.kind)) return wanted;
-  return { kind: techniques[Math.min(otherwise, techniques.length - 1)].kind, settings: {} };
+  const found = techniques.some((one) => one.kind === wanted) ? wanted : techniques[Math.min(otherwise, techniques.length - 1)].kind;
+  return { kind: found, settings: {} };
 }
 
 async function begin() {

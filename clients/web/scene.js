@@ -9,9 +9,10 @@ import { light_json } from "./light.js";
 /** @typedef {import("./client.js").Files} Files */
 /** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
  * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
-/** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows.
+/** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows,
+ * `suggested` the settings that suit it, for techniques that have such a key.
  * @typedef {{kind: string, title: string, objects: Json[], occluders: Json, receivers: Json, files: Files, room: Room, light: Light,
- *            fixed_light: string, lights: string[], renders: boolean}} Source */
+ *            fixed_light: string, lights: string[], renders: boolean, suggested: Json}} Source */
 
 const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
 
@@ -25,7 +26,7 @@ export function courtyard_source() {
       kind: "rectangle", position: [-3.4, 6.2, 4.8], target: [0, 0.6, -0.6],
       width: 0.9, height: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
-    fixed_light: "", lights: EVERY_LIGHT, renders: true,
+    fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
   };
 }
 
@@ -45,7 +46,8 @@ export function camera_source({ name, file, encoding, vertical_fov_deg, distance
       kind: "rectangle", position: [-0.7 * distance, 0.8 * distance, -0.5 * distance], target: [0, 0, -distance],
       width: 0.15 * distance, height: 0.15 * distance, radius: 0.08 * distance, angular_diameter_deg: 4,
     },
-    fixed_light: "", lights: EVERY_LIGHT, renders: true,
+    // A camera's depth has no back sides.
+    fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "front" },
   };
 }
 
@@ -64,7 +66,7 @@ export function light_view_source({ front, back, receiver, encoding, tan_half_fo
       width: 0.15 * distance, height: 0.15 * distance, radius: 0, angular_diameter_deg: 0,
     },
     fixed_light: "Only the size can change: these maps were seen from this light's centre along its axis. Another place would need other maps.",
-    lights: ["rectangle", "point"], renders: false,
+    lights: ["rectangle", "point"], renders: false, suggested: { sides: back ? "both" : "front" },
   };
 }
 

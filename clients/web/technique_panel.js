@@ -39,16 +39,25 @@ function control_of(key, schema, value, changed) {
   }
 }
 
+/** A technique with the settings that suit a source, as far as it has such keys and they are no defaults.
+ * @param {Technique[]} techniques @param {string} kind @param {Json} suggested @returns {Choice} */
+export function suggested_choice(techniques, kind, suggested) {
+  /** @type {Record<string, Json>} */
+  const keys = techniques.find((one) => one.kind === kind)?.schema.properties ?? {};
+  const fitting = Object.entries(suggested).filter(([key, value]) => keys[key]?.enum?.includes(value) && keys[key].default !== value);
+  return { kind, settings: Object.fromEntries(fitting) };
+}
+
 /** Fills `place` with the choice of technique and its controls, and calls `changed` with each new choice.
- * @param {HTMLElement} place @param {Technique[]} techniques @param {Choice} choice @param {string} light kind of the light
- * @param {(choice: Choice) => void} changed */
-export function technique_panel(place, techniques, choice, light, changed) {
+ * @param {HTMLElement} place @param {Technique[]} techniques @param {Choice} choice
+ * @param {{light: string, suggested: Json}} fits kind of the light, and settings that suit the source @param {(choice: Choice) => void} changed */
+export function technique_panel(place, techniques, choice, fits, changed) {
   const technique = techniques.find((one) => one.kind === choice.kind);
   const pick = choice_field(
     { label: "Kind", name: "kind", value: choice.kind, options: techniques.map((one) => [one.kind, label_of(one.kind)]) },
     (kind) => {
-      const next = { kind, settings: {} };
-      technique_panel(place, techniques, next, light, changed);
+      const next = suggested_choice(techniques, kind, fits.suggested);
+      technique_panel(place, techniques, next, fits, changed);
       place.querySelector("select")?.focus();
       changed(next);
     },
@@ -56,8 +65,8 @@ export function technique_panel(place, techniques, choice, light, changed) {
   place.replaceChildren(pick.node);
   if (!technique) return;
   place.append(element("p", { className: "help" }, technique.summary));
-  if (!technique.lights.includes(light))
-    place.append(element("p", { className: "notice", role: "status" }, `${label_of(technique.kind)} takes no ${light} light; it takes: ${technique.lights.join(", ")}.`));
+  if (!technique.lights.includes(fits.light))
+    place.append(element("p", { className: "notice", role: "status" }, `${label_of(technique.kind)} takes no ${fits.light} light; it takes: ${technique.lights.join(", ")}.`));
 
   const settings = { ...choice.settings };
   const keys = Object.entries(/** @type {Record<string, Json>} */ (technique.schema.properties)).filter(([key]) => key !== "kind");
@@ -74,7 +83,7 @@ export function technique_panel(place, techniques, choice, light, changed) {
     place.append(
       button("Defaults", () => {
         const next = { kind: choice.kind, settings: {} };
-        technique_panel(place, techniques, next, light, changed);
+        technique_panel(place, techniques, next, fits, changed);
         changed(next);
       }, "quiet"),
     );

@@ -114,7 +114,7 @@ class Modules(PageTest):
     def test_a_technique_that_nobody_knows_yet_gets_controls(self):
         got = self.module(
             """
-            const {technique_panel} = await page("technique_panel");
+            const {technique_panel, suggested_choice} = await page("technique_panel");
             const properties = {
                 kind: {const: "fog_map"},
                 fast: {type: "boolean", default: true, description: "Fast?"},
@@ -126,7 +126,7 @@ class Modules(PageTest):
             const techniques = [{kind: "fog_map", summary: "Fog.", lights: ["sphere"], schema: {properties}}];
             const place = document.createElement("div"), choices = [];
             document.body.append(place);
-            technique_panel(place, techniques, {kind: "fog_map", settings: {}}, "point", (choice) => choices.push(choice));
+            technique_panel(place, techniques, {kind: "fog_map", settings: {}}, {light: "point", suggested: {}}, (choice) => choices.push(choice));
             const set = (name, value, type) => {
                 const control = place.querySelector(`[name=${name}]`);
                 if (control.type === "checkbox") control.checked = value; else control.value = value;
@@ -141,6 +141,7 @@ class Modules(PageTest):
                 refused: set("steps", "65", "input"), count: choices.length, back: set("fast", true, "change"),
             };
             place.remove();
+            result.suggested = suggested_choice(techniques, "fog_map", {mode: "far", sides: "both", steps: 9}).settings;
             return result;
             """
         )
@@ -152,7 +153,20 @@ class Modules(PageTest):
         self.assertEqual(got["steps"], {"fast": False, "steps": 12})
         self.assertEqual(got["mode"], {"fast": False, "steps": 12, "mode": "far"})
         self.assertEqual((got["refused"], got["count"]), (got["mode"], 3))  # 65 is outside: nothing was passed on
+        self.assertEqual(got["suggested"], {"mode": "far"})  # of the keys that it has, enumerations
         self.assertEqual(got["back"], {"steps": 12, "mode": "far"})
+
+    def test_a_patch_takes_out_what_is_at_its_default_again(self):
+        got = self.module(
+            """
+            const {patch_of} = await page("client");
+            const kept = {kind: "soft_shadow_map", sides: "front", bias: 2};
+            const of = (technique) => patch_of({penumbra: 1, objects: [], light: {kind: "point"}, technique}, kept);
+            return [of({kind: "soft_shadow_map", bias: 3}), of({kind: "ray_traced", samples: 4})];
+            """
+        )
+        self.assertEqual(got[0], {"light": {"kind": "point"}, "technique": {"kind": "soft_shadow_map", "bias": 3, "sides": None}})
+        self.assertEqual(got[1], {"light": {"kind": "point"}, "technique": {"kind": "ray_traced", "samples": 4}})
 
     def test_lights_shine_from_their_place_to_their_aim(self):
         got = self.module(
