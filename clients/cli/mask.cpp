@@ -10,6 +10,7 @@
 #include "files.hpp"
 #include "opencl/quirks.hpp"
 #include "progress.hpp"
+#include "remote.hpp"
 #include "streams.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
@@ -18,7 +19,7 @@ namespace penumbra::cli {
 namespace {
 
 struct Flags {
-    std::string scene, mask, report, device;
+    std::string scene, mask, report, device, server;
     TechniqueFlags technique;
 };
 
@@ -27,16 +28,26 @@ Examples:
   penumbra mask scene.json -o mask.exr
   penumbra mask scene.json -o mask.png --technique soft_shadow_map --set sides=both
   penumbra mask scene.json -o mask.exr --report report.json --device 0
+  penumbra mask scene.json -o mask.exr --server http://127.0.0.1:8080
 
-Masks are visibility: 1 fully lit, 0 umbra, linear. Warnings go to standard error.)";
+Masks are visibility: 1 fully lit, 0 umbra, linear. Warnings go to standard error.
+A server that asks for a token gets the one in PENUMBRA_SERVER_TOKEN.)";
 
-void write_report(const Flags& flags, const Report& report)
+void write_report(const Flags& flags, const std::string& report)
 {
     try {
-        write_text(flags.report, report_json(report));
+        write_text(flags.report, report);
     } catch (const Error& error) {
         throw Error(error.code(), flags.mask + " is written, but its report is not: " + error.message(), error.hint());
     }
+}
+
+int run_on_server(const Flags& flags)
+{
+    if (!flags.device.empty()) throw Error(ErrorCode::usage, "--device " + flags.device + ": with --server, the server has the device");
+    const std::string report = mask_on_server({flags.server, flags.scene, flags.mask, flags.technique}, !flags.report.empty());
+    if (!flags.report.empty()) write_report(flags, report);
+    return 0;
 }
 
 int run(const Flags& flags)
@@ -52,6 +63,7 @@ int run(const Flags& flags)
     }
 
     require_not_named_in(flags.scene, flags.mask, "-o");
+    if (!flags.server.empty()) return run_on_server(flags);
 
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
     // is set first: nothing may read it meanwhile.
@@ -74,7 +86,7 @@ int run(const Flags& flags)
     write_image(flags.mask, mask.visibility, format);
     progress.end();
     print_warnings(mask.report.warnings);
-    if (!flags.report.empty()) write_report(flags, mask.report);
+    if (!flags.report.empty()) write_report(flags, report_json(mask.report));
     return 0;
 }
 
@@ -92,6 +104,7 @@ Verb mask_verb(CLI::App& program)
     add_technique_flags(*app, flags->technique);
     app->add_option("--report", flags->report, "stages with milliseconds, bytes, device, warnings")->option_text("REPORT.json");
     add_device_flag(*app, flags->device);
+    app->add_option("--server", flags->server, "let a service compute it; the scene's files are sent along")->option_text("URL");
     app->footer([] { return technique_help() + examples; });
     return {app, [flags] { return run(*flags); }};
 }

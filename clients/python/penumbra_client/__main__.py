@@ -30,6 +30,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
         format = FORMATS.get(os.path.splitext(options.output)[1].lower())
         if format is None:
             raise ValueError(f"-o {options.output}: expected one of the extensions {' '.join(FORMATS)}")
+        if not os.path.isdir(os.path.dirname(options.output) or "."):
+            raise ValueError(f"-o {options.output}: the folder {os.path.dirname(options.output)} is not there")
         client = Client(options.server, os.environ.get("PENUMBRA_SERVER_TOKEN"), timeout=options.timeout)
         scene, images = load_scene_file(options.scene)
     except (OSError, ValueError) as error:

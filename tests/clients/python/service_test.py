@@ -3,6 +3,7 @@
 import copy
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -21,13 +22,18 @@ SCENE = {
     "penumbra": 1,
     "light": {"kind": "rectangle", "center": [0, 0, 0], "half_u": [0.25, 0, 0], "half_v": [0, 0, -0.25]},
     "occluders": {"camera": CAMERA, "depth": {"front": "front.pfm"}},
-    "receivers": {"camera": CAMERA, "depth": "floor.pfm"},
+    "receivers": {"camera": {"kind": "light", "tan_half_fov": [0.5, 0.5]}, "depth": "floor.pfm"},
     "technique": {"kind": "soft_shadow_map", "sides": "front"},
 }
 IMAGES = {"front.pfm": FRONT, "floor.pfm": FLOOR}
 TRIANGLE = "v -1 2 -1\nv 1 2 -1\nv 0 2 1\nf 1 2 3\n"
 
 service = None
+
+
+def closed_url():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return f"http://127.0.0.1:{listener.getsockname()[1]}"
 
 
 def setUpModule():
@@ -84,15 +90,18 @@ class Service(support.FolderTest):
             local = self.local(name="mask" + extension)
             ran = self.run_module(self.path("scene.json"), "-o", self.path("remote" + extension), "--server", service.url)
             self.assertEqual((ran.returncode, ran.stdout, ran.stderr), (0, "", ""))
-            if extension != ".tif" and extension != ".exr":  # those may hold the time and the program's name
-                self.assertEqual(self.read("remote" + extension), local)
             self.assertEqual(self.read("remote" + extension)[:4], local[:4])
+            compared = support.run_penumbra("compare", self.path("remote" + extension), self.path("mask" + extension), "--json")
+            self.assertEqual(json.loads(compared.stdout)["max"], 0, extension)
+            if extension == ".pfm":
+                self.assertEqual(self.read("remote.pfm"), local)
         self.assertFalse([name for name in os.listdir(self.folder) if name.startswith("remote") and name.count(".") > 1])  # nothing left over
 
     def test_the_modules_command_fails_in_one_line(self):
         scene = self.write_scene()
         for arguments, code, said in ((["none.json", "-o", "m.pfm"], 2, "none.json"), ([scene, "-o", "m.jpg"], 2, ".exr"),
-                                      ([scene, "-o", "/nonexistent/m.pfm", "--server", service.url], 1, "/nonexistent"),
+                                      ([scene, "-o", "none/m.pfm"], 2, "none"),
+                                      ([scene, "-o", "m.pfm", "--server", closed_url()], 1, "refused"),
                                       ([scene, "-o", "m.pfm", "--server", "ftp://x"], 2, "ftp://x"),
                                       ([self.write("bad.json", "{}"), "-o", "m.pfm", "--server", service.url], 2, "422")):
             ran = self.run_module(*arguments)
@@ -103,6 +112,13 @@ class Service(support.FolderTest):
         environment = dict(os.environ, PENUMBRA_SERVER_TOKEN=TOKEN)
         return subprocess.run([sys.executable, "-m", "penumbra_client", *arguments], capture_output=True, text=True, env=environment,
                               cwd=self.folder, timeout=120)
+
+    def test_warnings(self):
+        wide = dict(SCENE, receivers={"camera": CAMERA, "depth": "floor.pfm"})
+        mask = client().mask(wide, IMAGES)
+        self.assertEqual(len(mask.warnings), 1)
+        self.assertIn("past the occluder map's border", mask.warnings[0])
+        self.assertEqual(client().mask(SCENE, IMAGES).warnings, [])
 
     def test_errors_name_the_key(self):
         scene = copy.deepcopy(SCENE)
@@ -162,8 +178,10 @@ class Kept(unittest.TestCase):
         with client().keep(SCENE, IMAGES) as kept:
             self.assertEqual(kept.mask().data, client().mask(SCENE, IMAGES).data)
             moved = copy.deepcopy(SCENE)
-            moved["light"]["center"] = [0.5, 0, 0.25]
-            self.assertEqual(kept.mask(light={"center": [0.5, 0, 0.25]}).data, client().mask(moved, IMAGES).data)
+            moved["light"]["half_u"] = [0.5, 0, 0]
+            wider = kept.mask(light={"half_u": [0.5, 0, 0]}).data
+            self.assertEqual(wider, client().mask(moved, IMAGES).data)
+            self.assertNotEqual(wider, client().mask(SCENE, IMAGES).data)
             self.assertEqual(kept.mask().data, client().mask(SCENE, IMAGES).data)  # for that request only
 
             other = dict(SCENE, technique={"kind": "shadow_map"})

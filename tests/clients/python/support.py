@@ -142,6 +142,9 @@ class RealService:
     def stop(self):
         self._process.terminate()
         self._process.wait(60)
+        if hasattr(self, "_reader"):
+            self._reader.join(60)
+        self._process.stderr.close()
 
 
 def run_penumbra(*arguments):

@@ -1,0 +1,156 @@
+#include "remote.hpp"
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <span>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include <penumbra/client.hpp>
+
+#include "files.hpp"
+#include "io/image_format.hpp"
+#include "io/image_io.hpp"
+#include "io/json_value.hpp"
+#include "progress.hpp"
+#include "streams.hpp"
+
+namespace penumbra::cli {
+namespace {
+
+// No service computes longer: an hour is the most that its --deadline-s takes.
+constexpr std::chrono::hours timeout{1};
+
+client::Format format_of_mask(const std::string& path)
+{
+    switch (format_of(format_for(path, {}, "-o"))) {
+    case ImageFormat::exr:
+        return client::Format::exr;
+    case ImageFormat::tiff:
+        return client::Format::tiff;
+    case ImageFormat::png:
+        return client::Format::png;
+    case ImageFormat::pfm:
+        return client::Format::pfm;
+    default:
+        throw Error(ErrorCode::usage, "-o " + path + ": is a format that services do not send", "expected .exr, .tif, .png or .pfm");
+    }
+}
+
+SettingValue setting_from(const JsonValue& value)
+{
+    const nlohmann::json& json = value.json();
+    if (json.is_boolean()) return json.get<bool>();
+    if (json.is_number_integer()) return value.integer(std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max());
+    if (json.is_number()) return value.number();
+    if (json.is_string()) return value.text();
+    throw value.expected("true, false, a number or a string");
+}
+
+// The scene's technique with the flags applied; without flags it stays as it is, for the service to judge.
+void apply_flags(nlohmann::json& scene, const TechniqueFlags& flags)
+{
+    if (flags.kind.empty() && flags.settings.empty()) return;
+    TechniqueRequest request;
+    if (const auto technique = JsonObject(JsonValue(scene, {})).find("technique")) {
+        const JsonObject section(*technique);
+        request.kind = section.need("kind").text();
+        for (const auto& [name, value] : section.members())
+            if (name != "kind") request.settings.emplace_back(name, setting_from(value));
+    }
+    request = apply(std::move(request), flags);
+    nlohmann::json& technique = scene["technique"] = {{"kind", request.kind}};
+    for (const auto& [name, value] : request.settings) std::visit([&](const auto& held) { technique[name] = held; }, value);
+}
+
+client::SceneFile read_for_upload(const RemoteMask& asked)
+{
+    return in_scene(asked.scene, [&] {
+        const std::vector<std::byte> bytes = read_file(asked.scene, asked.scene);
+        client::SceneFile file{parse_json({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), {}};
+        apply_flags(file.scene, asked.technique);
+        try {
+            file.images = client::take_files(file.scene, std::filesystem::path(asked.scene).parent_path());
+        } catch (const std::system_error& error) {
+            throw Error(ErrorCode::not_found, error.what());
+        }
+        return file;
+    });
+}
+
+// What the service said about the scene is about the scene; the rest is about the service.
+Error translated(const client::Error& error, const RemoteMask& asked)
+{
+    const client::Problem& problem = error.problem();
+    const std::string service = "--server " + asked.server + ": ";
+    switch (problem.status) {
+    case 422:
+        return Error(ErrorCode::invalid_input, asked.scene + ": " + problem.detail);
+    case 413:
+        return Error(ErrorCode::too_large, asked.scene + ": " + problem.detail);
+    case 401:
+        return Error(ErrorCode::usage, service + problem.detail, "the token goes into PENUMBRA_SERVER_TOKEN");
+    case 408:
+        return Error(ErrorCode::device, service + problem.detail);
+    default:
+        if (problem.status >= 400 && problem.status < 500) return Error(ErrorCode::usage, service + error.what());
+        return Error(ErrorCode::device, service + (problem.status == 0 ? problem.detail : error.what()));
+    }
+}
+
+std::string report_of(const client::Mask& mask, const client::Client& service, const nlohmann::json& scene, const RemoteMask& asked,
+                      double round_trip_ms)
+{
+    nlohmann::ordered_json report;
+    const nlohmann::json technique = scene.value("technique", nlohmann::json{{"kind", TechniqueRequest().kind}});
+    report["technique"] = technique.at("kind");
+    report["settings"] = technique;
+    report["settings"].erase("kind");
+    const nlohmann::json devices = service.devices().value("devices", nlohmann::json::array());
+    for (const nlohmann::json& device : devices)
+        if (device.value("selected", false))
+            report["device"] = {{"name", device.value("name", "")}, {"driver", device.value("driver", "")}};
+    const Image image = decode_image(std::as_bytes(std::span(mask.bytes)), asked.mask);
+    report["resolution"] = {image.width, image.height};
+    report["stages"] = nlohmann::ordered_json::array();
+    for (const auto& [name, ms] : mask.stages_ms) report["stages"].push_back({{"name", name}, {"ms", ms}});
+    report["warnings"] = mask.warnings;
+    report["server"] = asked.server;
+    report["request_id"] = mask.request_id;
+    report["round_trip_ms"] = round_trip_ms;
+    return report.dump(2) + "\n";
+}
+
+} // namespace
+
+std::string mask_on_server(const RemoteMask& asked, bool with_report)
+{
+    const client::Format format = format_of_mask(asked.mask);
+    const char* token = std::getenv("PENUMBRA_SERVER_TOKEN");
+    Progress progress;
+    try {
+        const client::Client service(asked.server, {.token = token ? token : "", .timeout = timeout, .traceparent = {}});
+        progress.step("reading " + asked.scene);
+        const client::SceneFile file = read_for_upload(asked);
+
+        progress.step("computing the mask on " + asked.server);
+        const auto begun = std::chrono::steady_clock::now();
+        const client::Mask mask = service.mask(file.scene, file.images, {.format = format});
+        const double round_trip_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count();
+
+        progress.step("writing " + asked.mask);
+        write_file(asked.mask, std::as_bytes(std::span(mask.bytes)));
+        progress.end();
+        print_warnings(mask.warnings);
+        return with_report ? report_of(mask, service, file.scene, asked, round_trip_ms) : std::string();
+    } catch (const client::Error& error) {
+        throw translated(error, asked);
+    } catch (const std::invalid_argument& error) {
+        throw Error(ErrorCode::usage, std::string("--server: ") + error.what());
+    }
+}
+
+} // namespace penumbra::cli

@@ -1,0 +1,6 @@
+include(CMakeFindDependencyMacro)
+find_dependency(Threads)
+find_dependency(nlohmann_json 3.10)
+find_dependency(PkgConfig)
+pkg_check_modules(CPP_HTTPLIB REQUIRED IMPORTED_TARGET cpp-httplib)
+include("${CMAKE_CURRENT_LIST_DIR}/penumbra_clientTargets.cmake")

@@ -1,0 +1,180 @@
+// penumbra mask --server, against the real service and one that answers by script.
+#include <algorithm>
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include <penumbra/image.hpp>
+
+#include "clients/fake_service.hpp"
+#include "clients/server_program.hpp"
+#include "command.hpp"
+
+namespace penumbra::test {
+namespace {
+
+const Environment with_token{{"PENUMBRA_SERVER_TOKEN", server_token}};
+
+class RemoteMaskCommand : public CommandTest {
+protected:
+    Ran remote(Arguments arguments, const Environment& environment = with_token)
+    {
+        if (!server) server = std::make_unique<ServerProgram>();
+        arguments.insert(arguments.end(), {"--server", server->url});
+        return penumbra(arguments, environment);
+    }
+    // write_scene's, through depth images in a folder: what a service takes.
+    std::string write_depth_scene(const std::string& technique = R"({"kind": "soft_shadow_map"})")
+    {
+        const Ran ran = penumbra({"depth", write_scene("objects.json", technique), "--out", path("depth")});
+        EXPECT_EQ(ran.code, 0) << ran.err;
+        return path("depth/scene.json");
+    }
+    std::unique_ptr<ServerProgram> server;
+};
+
+TEST_F(RemoteMaskCommand, TheSameBytesAsHere)
+{
+    for (const std::string& scene : {write_scene("scene.json"), write_depth_scene()}) {
+        const Ran local = penumbra({"mask", scene, "-o", path("local.pfm")});
+        EXPECT_EQ(local.code, 0) << local.err;
+        const Ran ran = remote({"mask", scene, "-o", path("remote.pfm")});
+        EXPECT_EQ(ran.code, 0) << ran.err;
+        EXPECT_EQ(ran.out, "");
+        EXPECT_EQ(ran.err, local.err); // the same warnings
+        expect_same_bytes(path("local.pfm"), path("remote.pfm"));
+    }
+    EXPECT_LT(std::ranges::min(read_image(path("remote.pfm")).pixels), 0.5f); // there is a shadow
+}
+
+TEST_F(RemoteMaskCommand, OtherFormatsHoldTheSamePixels)
+{
+    const std::string scene = write_scene("scene.json", R"({"kind": "soft_shadow_map"})", R"(, "output": {"format": "png", "bits": 8})");
+    for (const std::string name : {"mask.exr", "mask.tif", "mask.png"}) {
+        EXPECT_EQ(penumbra({"mask", scene, "-o", path("local-" + name)}).code, 0);
+        EXPECT_EQ(remote({"mask", scene, "-o", path(name)}).code, 0);
+        EXPECT_EQ(read_image(path(name)).pixels, read_image(path("local-" + name)).pixels) << name;
+    }
+    EXPECT_EQ(text_of(path("mask.png")).at(24), 8); // the scene's bits
+}
+
+TEST_F(RemoteMaskCommand, FlagsReplaceTheScenes)
+{
+    const std::string scene = write_scene("scene.json", R"({"kind": "soft_shadow_map", "sides": "front", "bias": 2})");
+    const Arguments flags{"--set", "sides=both", "--set", "resolution=32"};
+    Arguments here{"mask", scene, "-o", path("local.pfm")}, there{"mask", scene, "-o", path("remote.pfm"), "--report", path("report.json")};
+    here.insert(here.end(), flags.begin(), flags.end());
+    there.insert(there.end(), flags.begin(), flags.end());
+    EXPECT_EQ(penumbra(here).code, 0);
+    EXPECT_EQ(remote(there).code, 0);
+    expect_same_bytes(path("local.pfm"), path("remote.pfm"));
+
+    const auto report = nlohmann::json::parse(text_of(path("report.json")));
+    EXPECT_EQ(report.at("technique"), "soft_shadow_map");
+    EXPECT_EQ(report.at("settings"), (nlohmann::json{{"sides", "both"}, {"resolution", 32}, {"bias", 2}}));
+    EXPECT_EQ(report.at("resolution"), (std::vector<int>{40, 31}));
+    EXPECT_FALSE(report.at("device").at("name").get<std::string>().empty());
+    EXPECT_FALSE(report.at("stages").empty());
+    EXPECT_GT(report.at("round_trip_ms").get<double>(), 0);
+
+    const Ran other = remote({"mask", scene, "-o", path("other.pfm"), "--technique", "shadow_map"});
+    EXPECT_EQ(other.code, 0);
+    EXPECT_TRUE(other.err.starts_with("penumbra: warning: ")) << other.err; // the light's extent is ignored
+    EXPECT_NE(text_of(path("other.pfm")), text_of(path("remote.pfm")));
+}
+
+TEST_F(RemoteMaskCommand, FilesOfOneName)
+{
+    const std::string scene = write_depth_scene();
+    nlohmann::json json = nlohmann::json::parse(text_of(scene));
+    for (nlohmann::json* name : {&json["occluders"]["depth"]["front"], &json["receivers"]["depth"]}) {
+        const std::string folder = path(name == &json["receivers"]["depth"] ? "r" : "o");
+        ASSERT_EQ(std::system(("mkdir " + folder).c_str()), 0);
+        write_text(folder + "/depth.exr", text_of(path("depth/" + name->get<std::string>())));
+        *name = folder + "/depth.exr";
+    }
+    json["occluders"]["depth"]["back"] = "depth/" + json["occluders"]["depth"]["back"].get<std::string>();
+    write_text(path("moved.json"), json.dump());
+    EXPECT_EQ(penumbra({"mask", path("moved.json"), "-o", path("local.pfm")}).code, 0);
+    const Ran ran = remote({"mask", path("moved.json"), "-o", path("remote.pfm")});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    expect_same_bytes(path("local.pfm"), path("remote.pfm"));
+}
+
+TEST_F(RemoteMaskCommand, WhatTheServiceRefuses)
+{
+    const std::string scene = write_scene("scene.json");
+    expect_one_error(remote({"mask", scene, "-o", path("mask.pfm")}, {}), 2, {"--server http://", "PENUMBRA_SERVER_TOKEN"});
+    expect_one_error(remote({"mask", scene, "-o", path("mask.pfm")}, {{"PENUMBRA_SERVER_TOKEN", "another-secret-1"}}), 2, {"token"});
+
+    write_text(path("t.obj"), "v -1 2 -1\nv 1 2 -1\nv 0 2 1\nf 1 2 3\n");
+    std::string text = text_of(scene);
+    text.replace(text.find("\"quad\": { \"center\": [0.25"), 1, "\"mesh\": \"t.obj\", \"");
+    text.erase(text.find("\"quad\""), text.find(", \"casts\": true") - text.find("\"quad\"") + 2);
+    write_text(path("mesh.json"), text);
+    EXPECT_EQ(penumbra({"mask", path("mesh.json"), "-o", path("local.pfm")}).code, 0);
+    expect_one_error(remote({"mask", path("mesh.json"), "-o", path("mask.pfm")}), 2, {"mesh.json", "--allow-meshes"});
+
+    write_text(path("bad.json"), R"({"penumbra": 1, "light": {"kind": "cube"}})");
+    expect_one_error(remote({"mask", path("bad.json"), "-o", path("mask.pfm")}), 2, {"bad.json: light.kind"});
+    write_text(path("mask.pfm"), "from before");
+    expect_one_error(remote({"mask", path("bad.json"), "-o", path("mask.pfm")}), 2, {});
+    EXPECT_EQ(text_of(path("mask.pfm")), "from before");
+}
+
+TEST_F(RemoteMaskCommand, MeshesWhereTheServiceTakesThem)
+{
+    write_text(path("t.obj"), "v -1 2 -1\nv 1 2 -1\nv 0 2 1\nf 1 2 3\n");
+    write_text(path("scene.json"), R"({"penumbra": 1,
+        "light": {"kind": "rectangle", "center": [0, 6, 0], "half_u": [0.5, 0, 0], "half_v": [0, 0, -0.5]},
+        "objects": [{"mesh": "t.obj", "receives": false},
+                    {"quad": {"center": [0, 0, 0], "half_u": [4, 0, 0], "half_v": [0, 0, -4]}, "casts": false}],
+        "receivers": {"resolution": [40, 31]}})");
+    server = std::make_unique<ServerProgram>(std::vector<std::string>{"--allow-meshes"});
+    EXPECT_EQ(penumbra({"mask", path("scene.json"), "-o", path("local.pfm")}).code, 0);
+    const Ran ran = remote({"mask", path("scene.json"), "-o", path("remote.pfm")});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    expect_same_bytes(path("local.pfm"), path("remote.pfm"));
+}
+
+TEST_F(RemoteMaskCommand, WrongUsageIsFoundBeforeAnythingIsSent)
+{
+    const std::string scene = write_scene("scene.json");
+    const auto at = [&](const std::string& url, const std::string& mask, const Arguments& more = {}) {
+        Arguments arguments{"mask", scene, "-o", path(mask), "--server", url};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return penumbra(arguments);
+    };
+    const std::string nobody = "http://127.0.0.1:1";
+    expect_one_error(at("127.0.0.1:1", "mask.pfm"), 2, {"--server", "http://HOST"});
+    expect_one_error(at(nobody, "mask.hdr"), 2, {"mask.hdr", ".exr"});
+    expect_one_error(at(nobody, "mask.jpg"), 2, {"mask.jpg"});
+    expect_one_error(at(nobody, "mask.pfm", {"--device", "0"}), 2, {"--device", "--server"});
+    expect_one_error(at(nobody, "mask.pfm", {"--set", "sides=top"}), 2, {"--set sides=top"});
+    expect_one_error(at(nobody, "mask.pfm", {"--technique", "magic"}), 2, {"magic"});
+    expect_one_error(penumbra({"mask", path("none.json"), "-o", path("mask.pfm"), "--server", nobody}), 2, {"none.json"});
+    write_text(path("lost.json"), R"({"penumbra": 1, "receivers": {"depth": "lost.exr"}})");
+    expect_one_error(penumbra({"mask", path("lost.json"), "-o", path("mask.pfm"), "--server", nobody}), 2, {"lost.json", "lost.exr"});
+    write_text(path("twice.json"), R"({"penumbra": 1, "penumbra": 1})");
+    expect_one_error(penumbra({"mask", path("twice.json"), "-o", path("mask.pfm"), "--server", nobody}), 2, {"twice.json", "penumbra"});
+}
+
+TEST_F(RemoteMaskCommand, WorkThatFails)
+{
+    const std::string scene = write_scene("scene.json");
+    const auto expect_failure = [&](const std::string& reply, const std::vector<std::string>& said) {
+        FakeService fake({reply});
+        std::vector<std::string> parts{"--server " + fake.url};
+        parts.insert(parts.end(), said.begin(), said.end());
+        expect_one_error(penumbra({"mask", scene, "-o", path("mask.pfm"), "--server", fake.url}), 1, parts);
+    };
+    expect_failure(problem(500, "internal"), {"500: the detail"});
+    expect_failure(problem(504, "deadline"), {"504: the detail"});
+    expect_failure("", {"connection broke"});
+    expect_failure(answer(200, "<html>", "Content-Type: text/html\r\n"), {"text/html"});
+    expect_one_error(penumbra({"mask", scene, "-o", path("mask.pfm"), "--server", "http://127.0.0.1:1"}), 1, {"nobody answers"});
+    EXPECT_EQ(files(), (std::vector<std::string>{"scene.json"}));
+}
+
+} // namespace
+} // namespace penumbra::test

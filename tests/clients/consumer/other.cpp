@@ -1,0 +1,3 @@
+#include <penumbra/client.hpp>
+
+bool unused(const penumbra::client::Client& service) { return service.ready(); }
