@@ -14,6 +14,7 @@ void texels(const Engine& engine);       // Fig. 22: time over the number of occ
 void accumulators(const Engine& engine); // Fig. 14, Appendix A: binary16, binary32, compensated
 void baselines(const Engine& engine);    // shadow maps: hard, percentage-closer, bicubic
 void large(const Engine& engine);        // 4096 x 4096 receivers, 2048 x 2048 occluders
+void image_io(const Engine& engine);     // images from and to bytes beside OpenImageIO
 void limits(const Engine& engine);       // the device's arithmetic and memory limits, and what the inner loop reaches
 
 } // namespace penumbra::bench

@@ -27,6 +27,7 @@ constexpr Case cases[] = {
     {"accumulators", accumulators, "binary16, binary32, compensated (Fig. 14, Appendix A)"},
     {"baselines", baselines, "shadow maps: hard, percentage-closer, bicubic"},
     {"large", large, "4096 x 4096 receivers, 2048 x 2048 occluders"},
+    {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},
 };
 

@@ -95,7 +95,7 @@ OIIO::TypeDesc stored_type(const OutputFormat& format)
     return format.bits == 16 ? OIIO::TypeHalf : OIIO::TypeFloat;
 }
 
-// ZIP at zlib's fastest level: half the time, and masks a tenth larger. No date: the same pixels make the same bytes.
+// ZIP at zlib's fastest level (docs/bench.md has times and sizes). No date: the same pixels make the same bytes.
 OIIO::ImageSpec spec_for(const Image& image, const OutputFormat& format)
 {
     OIIO::ImageSpec spec(image.width, image.height, format.format == "hdr" ? 3 : image.channels, stored_type(format));

@@ -11,7 +11,7 @@
 namespace penumbra {
 
 // 1 to 4 channels with 8 or 16 bits, linear (gAMA 1). Values are in [0, 1], or as good as: they are clamped. Always the same bytes for the
-// same pixels. OpenImageIO's files are as small, but take five times as long: zlib at level 6, and all five filters tried.
+// same pixels. OpenImageIO takes several times as long: zlib at level 6, and all five filters tried (docs/bench.md has times and sizes).
 std::vector<std::byte> encode_png(const Image& image, int bits);
 
 // The file with nothing but the chunks that pixels are made of (IHDR, PLTE, tRNS, IDAT, IEND). Colour profiles, gamma, text and Exif go:
