@@ -25,6 +25,10 @@ const PFM = "image/x-portable-floatmap";
 const FIRST = { a: "soft_shadow_map", b: "ray_traced" };
 /** The second mask follows the light at once when it takes less than this; else when the light has rested that long. */
 const FOLLOWS_MS = 150;
+/** Tables follow a moving light this often: nobody reads them faster. */
+const FIGURES_MS = 250;
+/** How long a message stays. */
+const SAID_MS = 4000;
 
 const by_id = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
@@ -45,9 +49,16 @@ let b = { kind: FIRST.b, settings: {} };
 let version = 0;
 /** @type {{a: MaskReply | null, b: MaskReply | null, b_version: number}} */
 const shown = { a: null, b: null, b_version: -1 };
-let rest_timer = 0;
+let rest_timer = 0, figures_timer = 0;
 
-const say = (/** @type {string} */ text) => (by_id("said").textContent = text);
+let said_timer = 0;
+
+/** @param {string} text */
+function say(text) {
+  by_id("said").textContent = text;
+  clearTimeout(said_timer);
+  said_timer = setTimeout(() => (by_id("said").textContent = ""), SAID_MS);
+}
 
 /** @param {unknown} error @param {string} [whose] */
 function fail(error, whose = "") {
@@ -137,7 +148,7 @@ function show_masks() {
   by_id("legend").hidden = view.mode !== "difference";
   by_id("b_section").hidden = !comparing;
   show_overlay();
-  show_figures(comparing && !stale);
+  figures_timer ||= setTimeout(show_figures, FIGURES_MS);
 }
 
 function show_overlay() {
@@ -151,8 +162,9 @@ function show_overlay() {
     draw_casters(overlay.getContext("2d"), source.objects, source.receivers.camera, light.position);
 }
 
-/** @param {boolean} fresh_b */
-function show_figures(fresh_b) {
+function show_figures() {
+  figures_timer = 0;
+  const fresh_b = view.mode !== "mask" && shown.b_version === version;
   const tables = [];
   if (fresh_b && view.a && view.b) {
     if (view.comparable) tables.push(error_table(compare(view.a, view.b), a.kind, b.kind));

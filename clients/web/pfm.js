@@ -21,6 +21,14 @@ function words_of(bytes, count) {
   return { words, at };
 }
 
+const host_is_little = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
+
+/** Samples of the other byte order. @param {ArrayBuffer} buffer @param {number} at */
+function swapped(buffer, at) {
+  const view = new DataView(buffer, at);
+  return Float32Array.from({ length: view.byteLength / 4 }, (_, i) => view.getFloat32(4 * i, !host_is_little));
+}
+
 /** @param {ArrayBuffer} buffer @returns {FloatImage} */
 export function decode_pfm(buffer) {
   const { words, at } = words_of(new Uint8Array(buffer), 4);
@@ -35,10 +43,9 @@ export function decode_pfm(buffer) {
   if (buffer.byteLength - at !== expected)
     throw new Error(`the float map has ${buffer.byteLength - at} bytes of samples; ${width} x ${height} x ${channels} takes ${expected}`);
 
-  // Rows stand bottom up; a negative scale means little-endian.
-  const view = new DataView(buffer, at);
-  const pixels = new Float32Array(row * height);
-  for (let y = 0; y < height; y++)
-    for (let i = 0; i < row; i++) pixels[(height - 1 - y) * row + i] = view.getFloat32((y * row + i) * 4, scale < 0);
+  // A negative scale means little-endian; rows stand bottom up.
+  const samples = (scale < 0) === host_is_little ? new Float32Array(buffer.slice(at)) : swapped(buffer, at);
+  const pixels = new Float32Array(samples.length);
+  for (let y = 0; y < height; y++) pixels.set(samples.subarray(y * row, (y + 1) * row), (height - 1 - y) * row);
   return { width, height, channels, pixels };
 }

@@ -9,23 +9,32 @@ import { difference_image } from "./metrics.js";
 /** Full colour of the difference view. */
 export const DIFFERENCE_SCALE = 0.1;
 
-/** 8-bit value of a visibility, by table: 4096 steps are finer than 8 bits everywhere but in sRGB's first 1/4096.
+/** Opaque grey of a visibility, by table: 4096 steps are finer than 8 bits everywhere but in sRGB's first 1/4096.
  * @param {Tone} tone */
 function table_of(tone) {
   const encode = (/** @type {number} */ v) => (tone === "values" ? v : v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
-  return Uint8ClampedArray.from({ length: 4097 }, (_, i) => Math.round(255 * encode(i / 4096)));
+  const bytes = new Uint8ClampedArray(4 * 4097);
+  for (let i = 0; i <= 4096; i++) {
+    bytes.fill(Math.round(255 * encode(i / 4096)), 4 * i, 4 * i + 3);
+    bytes[4 * i + 3] = 255;
+  }
+  return bytes;
 }
 
 /** @param {FloatImage} mask @param {Uint8ClampedArray} table */
 function picture_of(mask, table) {
   const image = new ImageData(mask.width, mask.height);
-  const { data } = image;
-  const step = mask.channels === 3 ? 1 : 0;
-  for (let pixel = 0, from = 0, to = 0; pixel < mask.width * mask.height; pixel++, from += mask.channels, to += 4) {
-    data[to] = table[Math.round(4096 * mask.pixels[from])];
-    data[to + 1] = table[Math.round(4096 * mask.pixels[from + step])];
-    data[to + 2] = table[Math.round(4096 * mask.pixels[from + 2 * step])];
-    data[to + 3] = 255;
+  const { pixels } = mask;
+  const at = (/** @type {number} */ sample) => (4096 * pixels[sample] + 0.5) | 0;
+  if (mask.channels === 1) {
+    // Four bytes at a time.
+    const colours = new Uint32Array(table.buffer), data = new Uint32Array(image.data.buffer);
+    for (let i = 0; i < data.length; i++) data[i] = colours[at(i)];
+    return image;
+  }
+  for (let i = 0, to = 0; i < pixels.length; i += 3, to += 4) {
+    for (let channel = 0; channel < 3; channel++) image.data[to + channel] = table[4 * at(i + channel)];
+    image.data[to + 3] = 255;
   }
   return image;
 }

@@ -5,7 +5,7 @@ import re
 import time
 import unittest
 
-from browser import EXAMPLES, PageTest, Server
+from browser import EXAMPLES, WAIT_S, PageTest, Server
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -32,7 +32,7 @@ class Page(PageTest):
         self.assertEqual(mask["size"], [512, 512])
         self.assert_shadowed(mask)
         self.assertEqual(self.problem(), "")
-        self.assertIn("shade", self.find("#figures").text)
+        self.wait_for("return document.getElementById('figures').textContent.includes('shade')")
         self.screenshot("page_light.png")
         self.resize(1440, 960, dark=True)
         self.screenshot("page_dark.png")
@@ -101,6 +101,7 @@ class Page(PageTest):
         self.set_number("#wipe", 100)
         a = self.mask()
         self.assertEqual(len({both["digest"], a["digest"], b["digest"]}), 3)
+        self.wait_for("return document.getElementById('figures').textContent.includes('MAE')")
         figures = self.find("#figures").text
         for word in ("MAE", "RMSE", "Bias", "Max", "99 %", "soft_shadow_map against ray_traced", "B  ray_traced"):
             self.assertIn(word, figures)
@@ -198,6 +199,16 @@ class Page(PageTest):
         self.assertEqual(bytes(heads["exr"][:4]), b"\x76\x2f\x31\x01")
         self.assertIn(bytes(heads["tif"][:4]), (b"II*\0", b"MM\0*"))
         self.assertEqual(bytes(heads["pfm"][:2]), b"Pf")
+
+    def test_the_mask_is_saved(self):
+        self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(self.folder)})
+        self.find("#share .buttons button").click()
+        self.wait_for("return document.getElementById('said').textContent === 'mask.png saved'")
+        saved = self.folder / "mask.png"
+        end = time.monotonic() + WAIT_S
+        while not saved.exists() and time.monotonic() < end:
+            time.sleep(0.03)
+        self.assertEqual(saved.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
 
     def test_a_kept_scene_that_is_gone_is_sent_again(self):
         kept = self.module(
