@@ -1,4 +1,5 @@
 // Our own reading of plain EXR files beside OpenImageIO's: the same samples, bit for bit, or nothing.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <random>
@@ -91,7 +92,7 @@ std::vector<float> oracle(std::span<const std::byte> exr, const std::string& cha
 
 bool same_bits(const std::vector<float>& a, const std::vector<float>& b)
 {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+    return std::ranges::equal(a, b, [](float x, float y) { return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y); });
 }
 
 // Every channel of the file by both; fails where ours reads nothing.
