@@ -126,7 +126,8 @@ function update() {
   if (view.mode === "mask") return;
   const asked = version;
   const when_rested = () => {
-    if (asked !== version || shown.b_version === version) return;
+    // Without a first mask there is nothing to compare with, and its error is what the user should read.
+    if (asked !== version || shown.b_version === version || (shown.a === null && !queue.busy)) return;
     if (queue.busy) rest_timer = setTimeout(when_rested, FOLLOWS_MS);
     else queue.push(update_b);
   };
@@ -136,14 +137,14 @@ function update() {
 function show_masks() {
   view.draw();
   const frame = by_id("frame");
-  if (view.a) frame.style.setProperty("--aspect", String(view.a.width / view.a.height));
+  if (view.a) frame.parentElement.style.setProperty("--aspect", String(view.a.width / view.a.height));
   frame.style.setProperty("--wipe", String(view.wipe));
   const comparing = view.mode !== "mask";
   const stale = shown.b_version !== version;
   frame.classList.toggle("failed", shown.a === null);
   by_id("name_a").hidden = by_id("name_b").hidden = !comparing;
   by_id("name_a").textContent = `A  ${a.kind}`;
-  by_id("name_b").textContent = `B  ${b.kind}${shown.b === null ? ": none yet" : stale ? ": of an earlier moment" : ""}`;
+  by_id("name_b").textContent = `B  ${b.kind}${shown.b === null ? ": to come" : stale ? ": earlier" : ""}`;
   by_id("divider").hidden = by_id("wipe_row").hidden = view.mode !== "wipe";
   by_id("legend").hidden = view.mode !== "difference";
   by_id("b_section").hidden = !comparing;

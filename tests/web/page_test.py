@@ -252,7 +252,8 @@ class Page(PageTest):
             self.resize(width, 800, dark)
             for mode in ("mask", "wipe"):
                 self.view(mode)
-                self.assertLessEqual(self.js("return document.documentElement.scrollWidth"), width)
+                room, taken = self.js("const page = document.documentElement; return [page.clientWidth, page.scrollWidth]")
+                self.assertLessEqual(taken, room, (width, mode))
             if width == 360:
                 self.screenshot("page_narrow_dark.png" if dark else "page_narrow.png")
 
