@@ -7,8 +7,8 @@
     mask.pixels                                                                 # float32, (height, width): 1 fully lit, 0 umbra
 
     kept = client.keep(scene, images)                                           # uploaded once
-    for x in range(10):
-        kept.mask(light={"center": [x, 6, 0]})
+    for half in (0.1, 0.2, 0.5):
+        kept.mask(light={"half_u": [half, 0, 0], "half_v": [0, 0, -half]})
 
 Standard library only. With numpy, pixels are numpy arrays.
 """

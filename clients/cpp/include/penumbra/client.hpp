@@ -7,7 +7,7 @@
 //     mask.visibility.at(x, y);                                             // 1 fully lit, 0 umbra
 //
 //     auto kept = service.keep(scene, images);                              // uploaded once
-//     for (int x = 0; x < 10; ++x) kept.mask({{"light", {{"center", {x, 6, 0}}}}});
+//     for (double half : {0.1, 0.2, 0.5}) kept.mask({{"light", {{"half_u", {half, 0, 0}}, {"half_v", {0, 0, -half}}}}});
 #pragma once
 
 #include <memory>
