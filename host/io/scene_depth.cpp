@@ -122,9 +122,9 @@ DepthMap load_depth(const JsonValue& name, const MapEncoding& encoding, const Ca
                     std::vector<std::string>& warnings)
 {
     const std::string where = name.key() + ": " + name.text();
-    const RawDepth raw = decode_raw_depth(load_bytes(name, resources), encoding.channel, where, resources.max_samples());
+    RawDepth raw = decode_raw_depth(load_bytes(name, resources), encoding.channel, where, resources.max_samples());
     const Vec2 half = encoding.depth.kind == EncodingKind::radial ? tangents(camera, raw.width, raw.height, where) : Vec2(1, 1);
-    return decode_depth(raw, encoding.depth, half, where, warnings);
+    return decode_depth(std::move(raw), encoding.depth, half, where, warnings);
 }
 
 Occluders parse_occluders(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)

@@ -94,7 +94,7 @@ double precision_of(const RawDepth& raw, const DepthEncoding& encoding)
 
 } // namespace
 
-DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
+DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings)
 {
     const std::string at(where);
@@ -102,6 +102,16 @@ DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const 
     check_type(raw, encoding, at, warnings);
     if (!(encoding.scale > 0) || !std::isfinite(encoding.scale))
         throw Error(ErrorCode::invalid_input, at + ": encoding.scale is " + std::to_string(encoding.scale), "expected a positive number");
+
+    // Planar depth is what is wanted: nothing but what means nothing there is replaced. As is_empty says, for every sample at once.
+    if (encoding.kind == EncodingKind::planar && encoding.scale == 1 && !encoding.empty) {
+        const double precision = precision_of(raw, encoding);
+        const float end = is_integer(raw.type)              ? std::numeric_limits<float>::infinity()
+                          : raw.type == SampleType::float16 ? half_far_away
+                                                            : far_away;
+        for (float& stored : raw.samples) stored = stored > 0 && stored < end ? stored : nothing_there;
+        return {.width = raw.width, .height = raw.height, .depth = std::move(raw.samples), .precision = precision};
+    }
 
     DepthMap map{.width = raw.width, .height = raw.height, .depth = {}, .precision = precision_of(raw, encoding)};
     map.depth.reserve(raw.samples.size());

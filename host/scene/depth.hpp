@@ -27,8 +27,9 @@ struct RawDepth {
 
 // Planar depth from stored samples. `half_extent` are the camera's tangents (for radial). Throws invalid_input, message starting with
 // `where`: near and far missing, not finite or not 0 < near < far; 8-bit samples in an encoding other than normalized, window,
-// reversed_window; a decoded depth that is not positive. Adds warnings (half-float, 8-bit).
-DepthMap decode_depth(const RawDepth& raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
+// reversed_window; a decoded depth that is not positive. Adds warnings (half-float, 8-bit). Takes the samples: planar depth stays in their
+// memory.
+DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings);
 
 // The surfaces that a camera sees: neighbouring pixel centres joined by triangles, but not across a depth jump: where disparity steps by
