@@ -174,9 +174,28 @@ TEST(ClientErrors, AnUploadThatIsRefusedEarlySaysWhy)
     EXPECT_THROW((void)Client(fake.url).mask(scene, {{"x", std::string(64 << 20, 'x')}}), client::TooLarge);
 }
 
-TEST(ClientErrors, AResetDoesNotEndTheProcess)
+// Whether a write meets a closed connection is a matter of time, so the guard is tested by itself.
+TEST(ClientErrors, AWriteToAClosedConnectionDoesNotEndTheProcess)
 {
     std::signal(SIGPIPE, SIG_DFL); // what a program starts with
+    std::array<int, 2> ends{};
+    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()), 0);
+    ::close(ends[1]);
+    {
+        const client::detail::NoBrokenPipe guard;
+        EXPECT_EQ(::write(ends[0], "x", 1), -1);
+        EXPECT_EQ(errno, EPIPE);
+    }
+    ::close(ends[0]);
+    sigset_t pending, blocked;
+    sigpending(&pending);
+    pthread_sigmask(SIG_BLOCK, nullptr, &blocked);
+    EXPECT_EQ(sigismember(&pending, SIGPIPE), 0);
+    EXPECT_EQ(sigismember(&blocked, SIGPIPE), 0);
+}
+
+TEST(ClientErrors, AResetIsAConnectionThatFailed)
+{
     FakeService fake({{[](int socket) {
                            const linger at_once{.l_onoff = 1, .l_linger = 0};
                            ::setsockopt(socket, SOL_SOCKET, SO_LINGER, &at_once, sizeof(at_once));
