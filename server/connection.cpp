@@ -58,7 +58,7 @@ Connection::Connection(Lobby& lobby, Arrival arrival, Deadline request)
     setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
     // A request line without an end is none; a line that cannot be read has the library answer, and headers_too_large() say what.
     if (buffer_.find('\n') == std::string::npos) {
-        header_bytes_ = max_header_bytes;
+        line_too_long_ = true;
         buffer_ = "\r\n";
     }
     served = this;

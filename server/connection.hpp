@@ -52,7 +52,7 @@ public:
     const Deadline& request() const { return request_; }
     bool timed_out() const { return timed_out_; }
     bool too_slow() const { return too_slow_; } // timed out before the request's deadline: see transfer_end()
-    bool headers_too_large() const { return header_bytes_ > max_header_bytes; }
+    bool headers_too_large() const { return line_too_long_ || header_bytes_ > max_header_bytes; }
 
     // Of the request, for its handler and its log line. `reason` and `inside`: why it was refused, for metrics and for the log alone.
     std::string content_type, request_id, reason, inside;
@@ -67,7 +67,7 @@ private:
     Lobby& lobby_;
     socket_t socket_;
     Deadline request_;
-    bool in_body_ = false, timed_out_ = false, too_slow_ = false, ended_ = false;
+    bool in_body_ = false, timed_out_ = false, too_slow_ = false, ended_ = false, line_too_long_ = false;
     std::size_t header_bytes_ = 0;
     std::uint64_t body_left_ = 0, body_bytes_ = 0;
     Deadline::Clock::time_point body_begun_;

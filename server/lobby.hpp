@@ -38,7 +38,7 @@ struct Arrival {
 class Lobby {
 public:
     using Clock = std::chrono::steady_clock;
-    // `serve` gets each socket with its bytes, from the lobby's thread; it must not block.
+    // `serve` gets each socket with its bytes, from the lobby's thread; it must neither block nor call the lobby.
     using Serve = std::function<void(Arrival)>;
 
     // No more than `connections` are open at a time, those that are served included. One more pushes out the oldest that has waited for its

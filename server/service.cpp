@@ -83,15 +83,18 @@ void Service::Http::serve(Lobby& lobby, Arrival arrival)
 {
     const Deadline deadline(std::chrono::seconds(service_.options_.deadline_s), arrival.begun);
     Connection connection(lobby, std::move(arrival), deadline);
+    connection.request_id = service_.id_prefix_ + std::to_string(++service_.requests_);
     bool closed = false;
     process_request(connection, true, closed, [&](httplib::Request& request) { begin(request, connection); });
 }
 
 void Service::Http::begin(httplib::Request& request, Connection& connection)
 {
-    connection.begin_body(length_from(request.get_header_value("Content-Length")).value_or(0));
+    // How long a chunked body is nobody knows: it is refused, and what comes of it forgotten.
+    const bool chunked = request.has_header("Transfer-Encoding");
+    connection.begin_body(chunked ? UINT64_MAX : length_from(request.get_header_value("Content-Length")).value_or(0));
     const std::string given = request.get_header_value("X-Request-Id");
-    connection.request_id = is_request_id(given) ? given : service_.id_prefix_ + std::to_string(++service_.requests_);
+    if (is_request_id(given)) connection.request_id = given;
     connection.trace = trace_context_from(request.get_header_value("traceparent"));
     if (connection.trace) connection.span_id = new_span_id();
     // What the library would act on by itself: its multipart reader is quadratic in a header line's length, ranges it applies to any
