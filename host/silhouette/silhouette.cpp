@@ -42,13 +42,13 @@ struct Surface {
     bool turned(std::uint32_t triangle) const { return facing[triangle] == Facing::turned; }
 
     // The ends of a side as the facing triangle passes it.
-    std::uint32_t from(std::uint32_t side) const { return triangles[side / 3][(side + (turned(side / 3) ? 1 : 0) - 3 * (side / 3)) % 3]; }
-    std::uint32_t to(std::uint32_t side) const { return triangles[side / 3][(side + (turned(side / 3) ? 0 : 1) - 3 * (side / 3)) % 3]; }
+    std::uint32_t from(std::uint32_t side) const { return triangles[side / 3][(side % 3 + (turned(side / 3) ? 1 : 0)) % 3]; }
+    std::uint32_t to(std::uint32_t side) const { return triangles[side / 3][(side % 3 + (turned(side / 3) ? 0 : 1)) % 3]; }
 
     // The side of the same triangle that begins where this one ends.
     std::uint32_t next(std::uint32_t side) const
     {
-        const std::uint32_t triangle = side / 3, corner = side - 3 * triangle;
+        const std::uint32_t triangle = side / 3, corner = side % 3;
         return 3 * triangle + (corner + (turned(triangle) ? 2 : 1)) % 3;
     }
 };

@@ -113,10 +113,11 @@ std::vector<EdgeUse> sorted_edge_uses(std::span<const Triangle> triangles, std::
 // Triangles joined by edges of exactly two.
 struct Patches {
     std::vector<std::uint32_t> of;    // the patch of each triangle
-    std::vector<std::uint8_t> turned; // triangles to turn so that every patch is wound alike; none of one that cannot be
+    std::vector<std::uint8_t> turned; // triangles to turn so that every patch is wound alike, if it can be
     std::size_t count = 0;
 };
 
+// One that cannot be wound alike (a Moebius strip) keeps an edge that two triangles pass the same way; so it comes out open.
 Patches patches_of(std::span<const EdgeUse> uses, std::size_t triangles)
 {
     // What lies across each side, and whether it passes the edge the same way, so that one of the two has to be turned.
@@ -139,23 +140,15 @@ Patches patches_of(std::span<const EdgeUse> uses, std::size_t triangles)
         const auto patch = static_cast<std::uint32_t>(patches.count++);
         reached.assign(1, first);
         patches.of[first] = patch;
-        bool alike = true;
         for (std::size_t i = 0; i < reached.size(); ++i)
             for (std::uint32_t c = 0; c < 3; ++c) {
                 const std::uint32_t t = reached[i];
                 const Neighbour n = across[3 * t + c];
-                if (n.triangle == no_side) continue;
-                const auto wanted = static_cast<std::uint8_t>(patches.turned[t] ^ static_cast<std::uint8_t>(n.same_way));
-                if (patches.of[n.triangle] == no_side) {
-                    patches.of[n.triangle] = patch;
-                    patches.turned[n.triangle] = wanted;
-                    reached.push_back(n.triangle);
-                } else if (patches.turned[n.triangle] != wanted) {
-                    alike = false;
-                }
+                if (n.triangle == no_side || patches.of[n.triangle] != no_side) continue;
+                patches.of[n.triangle] = patch;
+                patches.turned[n.triangle] = static_cast<std::uint8_t>(patches.turned[t] ^ static_cast<std::uint8_t>(n.same_way));
+                reached.push_back(n.triangle);
             }
-        if (!alike)
-            for (const std::uint32_t t : reached) patches.turned[t] = 0;
     }
     return patches;
 }

@@ -58,6 +58,12 @@ TEST(Joined, FourInARow)
     EXPECT_FALSE(joined(1, 1, 2, 2, single));     // a step between two planes
     EXPECT_FALSE(joined(1, 0, 1, 1, single));     // nothing there
     EXPECT_FALSE(joined(1, 1, 0, 1, single));
+    // A limb, the first texel's centre f inside it.
+    for (const double f : {0.0, 0.001, 0.03, 0.5, 0.999}) {
+        const auto limb = [f](int i) { return 0.7 + 0.1 * std::sqrt(i + f); };
+        EXPECT_TRUE(joined(0, limb(0), limb(1), limb(2), single)) << f;
+        EXPECT_TRUE(joined(limb(2), limb(1), limb(0), 0, single)) << f;
+    }
     // The rounding of the two, 2^-11 of each.
     EXPECT_TRUE(joined(0, 1, 1 + 2 * 0x1p-11, 0, 0x1p-11));
     EXPECT_FALSE(joined(0, 1, 1 + 3 * 0x1p-11, 0, 0x1p-11));
