@@ -47,6 +47,7 @@ struct WorkCheck {
         const double points = settings.project ? static_cast<double>(settings.project_resolution) * settings.project_resolution : pixels();
         check_amount("receivers.resolution", texels * points, "pairs of occluder texel and receiver", options.pairs);
     }
+    void operator()(const SoftShadowVolume&) const {}
     void operator()(const RayTraced& settings) const
     {
         check_amount("technique.samples", pixels() * settings.samples, "rays", options.rays);

@@ -30,7 +30,18 @@ std::uint64_t Geometry::State::bytes() const
     const std::lock_guard lock(building_);
     if (casters_) total += casters_->bytes();
     if (receivers_ && receivers_ != casters_) total += receivers_->bytes();
+    if (topology_) total += topology_->bytes();
     return total;
+}
+
+std::shared_ptr<const Topology> Geometry::State::topology() const
+{
+    const std::lock_guard lock(building_);
+    if (topology_) return topology_;
+    std::vector<const TriangleMesh*> meshes;
+    for (const Object& object : *objects)
+        if (object.casts) meshes.push_back(&object.mesh);
+    return topology_ = std::make_shared<const Topology>(meshes);
 }
 
 std::shared_ptr<const Tracer> Geometry::State::tracer(bool Object::*role, std::shared_ptr<const Tracer>& slot) const

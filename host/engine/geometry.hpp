@@ -7,6 +7,7 @@
 
 #include <penumbra/engine.hpp>
 
+#include "silhouette/silhouette.hpp"
 #include "trace/tracer.hpp"
 
 namespace penumbra {
@@ -24,6 +25,9 @@ struct Geometry::State {
     std::shared_ptr<const Tracer> casters() const { return tracer(&Object::casts, casters_); }
     std::shared_ptr<const Tracer> receivers() const { return tracer(&Object::receives, receivers_); }
 
+    // How the triangles of the objects that cast hang together.
+    std::shared_ptr<const Topology> topology() const;
+
     const std::vector<Object> owned;
     const std::vector<Object>* const objects;
     const Vec3 near; // hierarchies are kept relative to here
@@ -33,6 +37,7 @@ private:
 
     mutable std::mutex building_;
     mutable std::shared_ptr<const Tracer> casters_, receivers_;
+    mutable std::shared_ptr<const Topology> topology_;
 };
 
 // A scene's objects without copying them: the scene has to stay.

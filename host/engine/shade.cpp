@@ -31,6 +31,8 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
 {
     if (const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data))
         shade_soft_shadow_map(work, *soft, points, visibility, counts);
+    else if (const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data))
+        shade_soft_shadow_volume(work, *wedges, points, visibility, counts);
     else
         shade_shadow_map(work, std::get<PreparedShadowMap>(state.data), points, visibility);
 }
@@ -38,8 +40,9 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
 // The program that the state was prepared with.
 const opencl::Specialisation& program_of(const Prepared::State& state)
 {
-    const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data);
-    return soft ? soft->program : std::get<PreparedShadowMap>(state.data).program;
+    if (const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data)) return soft->program;
+    if (const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data)) return wedges->program;
+    return std::get<PreparedShadowMap>(state.data).program;
 }
 
 // Depth of the receivers as the light sees them: from the objects that receive, else from the surfaces that the receivers' own depth shows.

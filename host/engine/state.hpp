@@ -13,6 +13,7 @@
 #include "technique/ray_traced.hpp"
 #include "technique/shadow_map.hpp"
 #include "technique/soft_shadow_map.hpp"
+#include "technique/soft_shadow_volume.hpp"
 
 namespace penumbra {
 
@@ -32,7 +33,7 @@ struct Prepared::State {
     Camera light_view;                             // of the occluder map; unused by rays
     bool covered = false;                          // every caster is known to lie inside the occluder map
     std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, for `project`; may be null
-    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap> data;
+    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume> data;
 
     std::vector<Stage> stages;
     double prepare_ms = 0;

@@ -17,6 +17,16 @@ opencl::Specialisation SoftShadowMapConstants::specialisation() const
              {"ACCUMULATOR", std::to_string(accumulator)}}};
 }
 
+opencl::Specialisation SoftShadowVolumeConstants::specialisation() const
+{
+    return {"soft_shadow_volume.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"ITEM_ROWS", std::to_string(item_rows)},
+             {"TILE_ROWS", std::to_string(rows)},
+             {"LIGHT", std::to_string(light)},
+             {"ACCUMULATOR", std::to_string(accumulator)}}};
+}
+
 std::vector<opencl::Specialisation> every_specialisation()
 {
     std::vector<opencl::Specialisation> all{ReceiversConstants{}.specialisation(), OccludersConstants{}.specialisation(),
@@ -25,6 +35,12 @@ std::vector<opencl::Specialisation> every_specialisation()
         for (const int accumulator : {0, 1, 2})
             all.push_back(SoftShadowMapConstants{.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = accumulator}
                               .specialisation());
+    for (const int lanes : {1, 8, 16})
+        for (const int light : {0, 1})
+            for (const int accumulator : {0, 1, 2, 3})
+                all.push_back(SoftShadowVolumeConstants{
+                    .lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .light = light, .accumulator = accumulator}
+                                  .specialisation());
     return all;
 }
 

@@ -36,6 +36,15 @@ struct SoftShadowMapConstants {
     opencl::Specialisation specialisation() const;
 };
 
+struct SoftShadowVolumeConstants {
+    int lanes = 16;
+    int item_rows = tile_rows;
+    int rows = tile_rows;
+    int light = 0;       // 0 rectangle, 1 disc
+    int accumulator = 0; // in the order of WedgeBuffer
+    opencl::Specialisation specialisation() const;
+};
+
 // What the kernels are built with on some device; the build compiles each.
 std::vector<opencl::Specialisation> every_specialisation();
 

@@ -38,4 +38,26 @@ typedef struct {
     float edge_on_x, edge_on_y;     // 1 / (2 k h): times a surface's disparity step a texel, 1 where the surface is edge-on to the light
 } OccluderView;
 
+// What casts, as soft_shadow_volume's kernels search it: sheets of light-facing triangles with the edges around them, in groups of WEDGE_GROUP.
+#define WEDGE_GROUP 16
+typedef struct {
+    int edges_begin, edges_end;         // groups of edges
+    int triangles_begin, triangles_end; // groups of triangles
+} Sheet;
+
+// The light that casts them, or a part of it.
+typedef struct {
+    float scale_x, scale_y, scale_d;   // from a receiver's (xi, eta, d) to tangents and disparity in the light's half extents
+    float centre_x, centre_y;          // of the part, in half extents of the part, from the centre of the whole light
+    float reach_x, reach_y;            // of the light in half extents: 1, or that of its bounding sphere for loose wedges
+    float bias_x, bias_y;              // self-shadow: a caster's disparity steps count for this far in x and y; 0 for triangles
+    float precision;                   // of receiver depth, relative
+    float position_error;              // of receivers in light space beside their own rounding, in half extents
+    float share;                       // what the part's visibility counts for in the whole light's
+    int sheets;
+    int overlap;                       // 0 sum, 1 max, 2 half_min, 3 product
+    int culling;                       // 0 none, 1 loose, 2 tight
+    int first;                         // whether it is the first part: visibility is written, not added to
+} WedgeLight;
+
 #endif

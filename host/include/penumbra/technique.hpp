@@ -26,24 +26,38 @@ enum class Reduction { area, nearest };
 // Soft Shadow Maps (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006): each texel of the occluder map is a micro-patch
 // parallel to the light; its back-projection's share of the light is summed.
 struct SoftShadowMap {
-    Sides sides = Sides::both;                         // 3.5: one map each, merged by the larger occlusion
-    int resolution = 0;                                // texels along the occluder map's longer side; 0: the map as it is
-    Reduction reduction = Reduction::area;             // how a larger map becomes `resolution`
-    Accumulator accumulator = Accumulator::binary32;   // binary16: the blending of Appendix A, for study
-    double bias = 1.0;                                 // in units of the bound derived from each texel's slope and the depth's precision
-    bool project = false;                              // shade in the light's view and sample that mask from the receivers' camera (3.1)
-    int project_resolution = 512;                      // of that mask
+    Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
+    int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
+    Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`
+    Accumulator accumulator = Accumulator::binary32; // binary16: the blending of Appendix A, for study
+    double bias = 1.0;                               // in units of the bound derived from each texel's slope and the depth's precision
+    bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
+    int project_resolution = 512;                    // of that mask
+};
+
+enum class Overlap { sum, max, half_min, product };
+enum class WedgeBuffer { binary32, int16, six_bits, twelve_bits };
+enum class WedgeCulling { none, loose, far_depth, tight };
+
+// Soft Shadow Volumes (Assarsson, A Real-Time Soft Shadow Volume Algorithm, 2003): the hard shadow of the light's centre, corrected inside
+// the penumbra wedge of each silhouette edge. Exact for a caster whose silhouette is the same from all of the light, as of a planar one.
+struct SoftShadowVolume {
+    Overlap overlap = Overlap::sum;             // how sheets that hide the same light are joined; half_min: Paper IV, Eq. 1
+    int light_splits = 1;                       // n x n parts of a rectangle, each with silhouettes of its own (Paper IV, 5.2)
+    WedgeBuffer buffer = WedgeBuffer::binary32; // the papers' integer buffers, for study
+    WedgeCulling culling = WedgeCulling::tight; // what spares pairs of edge and receiver, for study; the mask is the same
+    double bias = 1.0;                          // of casters made from depth maps: half texels that count as the receiver's own surface
 };
 
 // Shadow rays (Embree) through the scene's objects: the reference. Stratified over the light and seeded.
 struct RayTraced {
-    int samples = 256;       // rays a receiver
-    bool adaptive = false;   // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
+    int samples = 256;     // rays a receiver
+    bool adaptive = false; // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
     int first_samples = 16;
     std::int64_t seed = 1;
 };
 
-using Technique = std::variant<ShadowMap, SoftShadowMap, RayTraced>;
+using Technique = std::variant<ShadowMap, SoftShadowMap, SoftShadowVolume, RayTraced>;
 
 // The typed settings of a request, and back. Throws invalid_input for an unknown kind or key (naming the known ones), a value of the
 // wrong type or out of range.

@@ -1,0 +1,292 @@
+#include "technique/wedge_data.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace penumbra {
+namespace {
+
+constexpr std::size_t group_size = WEDGE_GROUP;
+constexpr double everywhere = 1e18; // beyond any tangent and disparity that a box is compared with
+
+// A box of points (x / z, y / z, 1 / z).
+struct Box {
+    std::array<double, 2> low{everywhere, everywhere}, high{-everywhere, -everywhere};
+    double near = -1;
+
+    void add(const Vec3& point)
+    {
+        // At or behind the light's plane a point has no place in this space: its penumbra may be anywhere.
+        if (!(point.z > 0)) {
+            low = {-everywhere, -everywhere};
+            high = {everywhere, everywhere};
+            near = everywhere;
+            return;
+        }
+        for (int axis = 0; axis < 2; ++axis) {
+            const std::size_t i = static_cast<std::size_t>(axis);
+            low[i] = std::min(low[i], std::max(point[axis] / point.z, -everywhere));
+            high[i] = std::max(high[i], std::min(point[axis] / point.z, everywhere));
+        }
+        near = std::max(near, std::min(1 / point.z, everywhere));
+    }
+    void add(const Box& other)
+    {
+        for (std::size_t i = 0; i < 2; ++i) {
+            low[i] = std::min(low[i], other.low[i]);
+            high[i] = std::max(high[i], other.high[i]);
+        }
+        near = std::max(near, other.near);
+    }
+};
+
+// Boxes as blocks of 16: low x, high x, low y, high y, near. What pads the last block meets nothing.
+std::vector<float> blocks(const std::vector<Box>& boxes)
+{
+    const std::size_t count = (boxes.size() + 15) / 16;
+    std::vector<float> floats(std::max<std::size_t>(count, 1) * 80, -1.0F);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        float* const block = floats.data() + i / 16 * 80 + i % 16;
+        block[0] = static_cast<float>(boxes[i].low[0]);
+        block[16] = static_cast<float>(boxes[i].high[0]);
+        block[32] = static_cast<float>(boxes[i].low[1]);
+        block[48] = static_cast<float>(boxes[i].high[1]);
+        block[64] = static_cast<float>(boxes[i].near);
+    }
+    return floats;
+}
+
+class Builder {
+public:
+    Builder(const Topology& topology, const LightFrame& light, const LightPart& part) : any_plane_(light.shape == LightShape::disc)
+    {
+        points_.reserve(topology.vertices().size());
+        for (const Imath::V3f& vertex : topology.vertices()) {
+            const Vec3 from = Vec3(vertex) - part.centre;
+            // Rounded once, here: triangles and edges then meet to the bit.
+            const auto rounded = [](double value) { return static_cast<double>(static_cast<float>(value)); };
+            points_.emplace_back(rounded(from.dot(light.u) / part.half.x), rounded(from.dot(light.v) / part.half.y),
+                                 rounded(from.dot(light.direction) / part.half.z));
+        }
+    }
+
+    void begin_sheet()
+    {
+        sheet_ = {.edges_begin = static_cast<int>(edge_groups_.size()),
+                  .edges_end = 0,
+                  .triangles_begin = static_cast<int>(triangle_groups_.size()),
+                  .triangles_end = 0};
+        sheet_box_ = {};
+    }
+    void end_sheet()
+    {
+        sheet_.edges_end = static_cast<int>(edge_groups_.size());
+        sheet_.triangles_end = static_cast<int>(triangle_groups_.size());
+        if (sheet_.edges_begin == sheet_.edges_end && sheet_.triangles_begin == sheet_.triangles_end) return;
+        data_.sheets.push_back(sheet_);
+        sheet_boxes_.push_back(sheet_box_);
+    }
+
+    void add_edges(std::span<const SilhouetteEdge> edges)
+    {
+        std::vector<SilhouetteEdge> counted;
+        for (const SilhouetteEdge& edge : edges)
+            if (counts(edge.from) || counts(edge.to)) counted.push_back(edge);
+        data_.edge_count += counted.size();
+        for (std::size_t first = 0; first < counted.size(); first += group_size)
+            add_edge_group(std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
+    }
+
+    void add_triangles(std::span<const std::array<std::uint32_t, 3>> triangles)
+    {
+        std::vector<std::array<std::uint32_t, 3>> counted;
+        for (const auto& triangle : triangles)
+            if (counts(triangle[0]) || counts(triangle[1]) || counts(triangle[2])) counted.push_back(triangle);
+        data_.triangle_count += counted.size();
+        sort_by_place(counted);
+        for (std::size_t first = 0; first < counted.size(); first += group_size)
+            add_triangle_group(std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
+    }
+
+    WedgeData take()
+    {
+        data_.sheet_boxes = blocks(sheet_boxes_);
+        data_.edge_boxes = blocks(edge_groups_);
+        data_.triangle_boxes = blocks(triangle_groups_);
+        return std::move(data_);
+    }
+
+private:
+    bool counts(std::uint32_t vertex) const { return any_plane_ || points_[vertex].z > 0; }
+
+    // Along a Z curve over the light's view, so that a group's box is small.
+    void sort_by_place(std::vector<std::array<std::uint32_t, 3>>& triangles) const
+    {
+        Box all;
+        for (const auto& triangle : triangles)
+            if (points_[triangle[0]].z > 0) all.add(points_[triangle[0]]);
+        std::vector<std::pair<std::uint32_t, std::uint32_t>> order; // code, triangle
+        const auto spread = [](std::uint32_t v) {
+            v = (v | v << 8) & 0x00ff00ffU;
+            v = (v | v << 4) & 0x0f0f0f0fU;
+            v = (v | v << 2) & 0x33333333U;
+            return (v | v << 1) & 0x55555555U;
+        };
+        const auto cell = [&](const Vec3& point, int axis) {
+            const std::size_t i = static_cast<std::size_t>(axis);
+            const double size = all.high[i] - all.low[i];
+            const double place = point.z > 0 && size > 0 ? (point[axis] / point.z - all.low[i]) / size : 0;
+            return static_cast<std::uint32_t>(std::clamp(place, 0.0, 1.0) * 65535);
+        };
+        for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+            const Vec3& point = points_[triangles[i][0]];
+            order.emplace_back(spread(cell(point, 0)) | spread(cell(point, 1)) << 1, i);
+        }
+        std::sort(order.begin(), order.end());
+        std::vector<std::array<std::uint32_t, 3>> sorted;
+        sorted.reserve(triangles.size());
+        for (const auto& [code, index] : order) sorted.push_back(triangles[index]);
+        triangles = std::move(sorted);
+    }
+
+    void add_edge_group(std::span<const SilhouetteEdge> edges)
+    {
+        const std::size_t ends = data_.edge_ends.size(), rows = data_.edges.size();
+        data_.edge_ends.resize(ends + 6 * group_size, -1.0F); // 1 / z of -1 meets nothing
+        data_.edges.resize(rows + 8 * group_size, 0.0F);
+        Box box;
+        for (std::size_t i = 0; i < edges.size(); ++i) {
+            const bool forward = edges[i].from < edges[i].to;
+            const Vec3 &a = points_[forward ? edges[i].from : edges[i].to], &b = points_[forward ? edges[i].to : edges[i].from];
+            float* const row = data_.edges.data() + rows + 8 * i;
+            const std::array<double, 7> values{a.x, a.y, a.z, b.x, b.y, b.z, forward ? 1.0 : -1.0};
+            std::transform(values.begin(), values.end(), row, [](double value) { return static_cast<float>(value); });
+
+            Box own;
+            own.add(a);
+            own.add(b);
+            box.add(own);
+            float* const end = data_.edge_ends.data() + ends + i;
+            const bool unbounded = own.near >= everywhere;
+            const auto place = [&](const Vec3& point, std::size_t first) {
+                end[(first + 0) * 16] = unbounded ? 0.0F : static_cast<float>(point.x / point.z);
+                end[(first + 1) * 16] = unbounded ? 0.0F : static_cast<float>(point.y / point.z);
+                end[(first + 2) * 16] = static_cast<float>(unbounded ? everywhere : 1 / point.z);
+            };
+            place(a, 0);
+            place(b, 3);
+        }
+        edge_groups_.push_back(box);
+        sheet_box_.add(box);
+    }
+
+    void add_triangle_group(std::span<const std::array<std::uint32_t, 3>> triangles)
+    {
+        const std::size_t rows = data_.triangles.size();
+        data_.triangles.resize(rows + 16 * group_size, 0.0F); // a plane of disparity 0 is before nothing
+        std::vector<Box> boxes;
+        Box box;
+        for (std::size_t i = 0; i < triangles.size(); ++i) {
+            std::array<std::uint32_t, 3> order = triangles[i];
+            // Seen from the light they turn counter-clockwise; sorting turns them round with each exchange.
+            bool turned = false;
+            const auto exchange = [&](std::size_t j, std::size_t k) {
+                if (order[j] > order[k]) {
+                    std::swap(order[j], order[k]);
+                    turned = !turned;
+                }
+            };
+            exchange(0, 1);
+            exchange(1, 2);
+            exchange(0, 1);
+            const Vec3 &a = points_[order[0]], &b = points_[order[1]], &c = points_[order[2]];
+            const Vec3 normal = (b - a).cross(c - a), plane = normal / normal.dot(a);
+            Box own;
+            own.add(a);
+            own.add(b);
+            own.add(c);
+            boxes.push_back(own);
+            box.add(own);
+            // Edge-on to the light's centre it covers nothing.
+            const bool flat = !(std::abs(plane.x) < everywhere && std::abs(plane.y) < everywhere && std::abs(plane.z) < everywhere);
+            const std::array<double, 13> values{a.x,
+                                                a.y,
+                                                a.z,
+                                                b.x,
+                                                b.y,
+                                                b.z,
+                                                c.x,
+                                                c.y,
+                                                c.z,
+                                                flat ? 0 : plane.x,
+                                                flat ? 0 : plane.y,
+                                                flat ? 0 : plane.z,
+                                                turned ? -1.0 : 1.0};
+            std::transform(values.begin(), values.end(), data_.triangles.data() + rows + 16 * i,
+                           [](double value) { return static_cast<float>(value); });
+        }
+        const std::vector<float> extents = blocks(boxes);
+        data_.triangle_extents.insert(data_.triangle_extents.end(), extents.begin(), extents.end());
+        triangle_groups_.push_back(box);
+        sheet_box_.add(box);
+    }
+
+    const bool any_plane_;
+    std::vector<Vec3> points_;
+    WedgeData data_;
+    std::vector<Box> sheet_boxes_, edge_groups_, triangle_groups_;
+    Sheet sheet_{};
+    Box sheet_box_;
+};
+
+} // namespace
+
+std::vector<LightPart> parts_of(const LightFrame& light, int splits)
+{
+    const double longer = std::max(light.half_u, light.half_v);
+    const auto extent = [&](double half) { return longer == 0 ? 1.0 : std::max(half, longer * 0x1p-12); };
+    if (light.shape == LightShape::disc || longer == 0)
+        return {{.centre = light.origin,
+                 .half = Vec3(extent(light.half_u), extent(light.half_v), longer == 0 ? 1.0 : longer),
+                 .centre_x = 0,
+                 .centre_y = 0,
+                 .share = 1}};
+
+    std::vector<LightPart> parts;
+    const Vec3 half(extent(light.half_u) / splits, extent(light.half_v) / splits, 1);
+    for (int j = 0; j < splits; ++j)
+        for (int i = 0; i < splits; ++i) {
+            const double x = 2 * i + 1 - splits, y = 2 * j + 1 - splits;
+            parts.push_back({.centre = light.origin + light.u * (x * half.x) + light.v * (y * half.y),
+                             .half = half,
+                             .centre_x = x,
+                             .centre_y = y,
+                             .share = 1.0 / (splits * splits)});
+        }
+    return parts;
+}
+
+WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, const LightFrame& light, const LightPart& part, bool apart,
+                     bool edges_too)
+{
+    // Edges of each sheet, loop after loop.
+    std::vector<std::vector<SilhouetteEdge>> edges(apart ? silhouette.sheets() : 1);
+    if (edges_too)
+        for (const SilhouetteEdge& edge : silhouette.edges) edges[apart ? edge.sheet : 0].push_back(edge);
+
+    Builder builder(topology, light, part);
+    const std::span facing(silhouette.facing);
+    for (std::size_t sheet = 0; sheet < edges.size(); ++sheet) {
+        builder.begin_sheet();
+        const std::size_t first = apart ? silhouette.facing_begin[sheet] : 0,
+                          last = apart ? silhouette.facing_begin[sheet + 1] : facing.size();
+        builder.add_triangles(facing.subspan(first, last - first));
+        builder.add_edges(edges[sheet]);
+        builder.end_sheet();
+    }
+    return builder.take();
+}
+
+} // namespace penumbra

@@ -1,0 +1,40 @@
+// Silhouettes as soft_shadow_volume's kernel reads them: light space, boxes for culling, groups. Plain arrays; no device.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/shared.h"
+#include "scene/light_space.hpp"
+#include "silhouette/silhouette.hpp"
+
+namespace penumbra {
+
+// The point that silhouettes are seen from, and what lengths are counted in: a light, or a part of a rectangle.
+struct LightPart {
+    Vec3 centre;               // world
+    Vec3 half;                 // units of light-space x, y and z: half extents and 1 for a rectangle; the radius for a disc
+    double centre_x, centre_y; // of the part, from the light's centre, in `half`
+    double share;              // of the whole light
+};
+
+// n x n parts of a rectangle; of any other light one. An extent of 0 beside another counts as 2^-12 of that; two of 0 as 1, which no edge
+// is then tested against.
+std::vector<LightPart> parts_of(const LightFrame& light, int splits);
+
+struct WedgeData {
+    std::vector<Sheet> sheets;
+    std::vector<float> sheet_boxes, edge_boxes, triangle_boxes; // blocks of 16 boxes, 5 x 16 floats each
+    std::vector<float> edge_ends;                               // 6 x 16 floats a group
+    std::vector<float> edges;                                   // 8 floats an edge
+    std::vector<float> triangle_extents;                        // 5 x 16 floats a group
+    std::vector<float> triangles;                               // 16 floats a triangle
+    std::uint64_t edge_count = 0, triangle_count = 0;           // before padding
+};
+
+// `apart`: each sheet for itself; else all as one. Without `edges_too` there are triangles alone (a light of no extent).
+// What lies behind the light's plane is left out, but for a disc, whose plane turns with the receiver.
+WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, const LightFrame& light, const LightPart& part, bool apart,
+                     bool edges_too);
+
+} // namespace penumbra

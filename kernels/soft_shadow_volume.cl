@@ -1,0 +1,511 @@
+// Soft Shadow Volumes: penumbra wedges in gather form (Assarsson, A Real-Time Soft Shadow Volume Algorithm, 2003, Papers I to IV).
+//
+//     occlusion(p) = H(p) - sum over silhouette edges of A_e(p)
+//
+// H counts the light-facing triangles between p and the light's centre (Paper III, 3.2.1; counted in light space, so that it does not matter where the
+// camera is). A_e is the share of the light beyond the edge as seen from p, inside the angle that the edge's ends make with the light's centre; it is
+// positive where the centre lies on the edge's left (3.2.2, Fig. 8). Only receivers inside an edge's wedge have A_e other than 0, and a wedge is a bound
+// for culling only.
+//
+// Specialisation constants
+//   LANES, ITEM_ROWS, TILE_ROWS   as in soft_shadow_map.cl
+//   LIGHT        0 rectangle, 1 sphere (the disc that faces the receiver)
+//   COVERAGE     0 linear (Paper I), 1 analytic (Paper IV, 4.2), 2 texture (Paper III, 3.3)
+//   ACCUMULATOR  0 binary32; the papers' buffers, emulated: 1 signed 16 bits with 255 levels (Paper I), 2 six bits (Paper III), 3 twelve bits (Paper IV)
+//
+// Light space here: x and y in the light's half extents (its radius: z as well), so that the light is [-1, 1]^2 or the unit disc. A receiver is its tangents
+// t = p.xy / p.z and its disparity d = 1 / p.z. The line from p through e meets the light's plane at (e.xy - t e.z) / (1 - e.z d).
+#include "common/shared.h"
+#include "occluders.cl"
+#include "receivers.cl"
+#include "common/lanes.clh"
+
+// LANES receivers.
+typedef struct {
+    floatn tx, ty, d;
+} Receivers;
+
+// The light's centre as seen along a receiver's line past a vertex: X = x - t z. The light-space origin of the plane through the vertex.
+inline floatn across(const float coordinate, const float z, const floatn t) { return fma((floatn)(-z), t, (floatn)(coordinate)); }
+
+// Whether the light's centre lies left of the line from a to b, both as `across` gives them; all ones where it does. One expression for triangles and for
+// silhouettes, always from the vertex of the lower number to the other, so that both decide alike to the last bit. A centre on the line is moved by
+// (e, e^2) for an e that is as small as need be: no point is on two sides, or on none.
+inline intn left_of(const floatn ax, const floatn ay, const floatn bx, const floatn by)
+{
+    const floatn area = fma(ax, by, -(bx * ay));
+    const floatn zero = (floatn)(0.0f);
+    intn left = area > zero;
+    const intn on = area == zero;
+#if LANES == 1
+    if (on) left = ay > by || (ay == by && bx > ax);
+#else
+    if (any(on)) left |= on & ((ay > by) | ((ay == by) & (bx > ax)));
+#endif
+    return left;
+}
+
+// --- Culling ----------------------------------------------------------------------------------------------------------------------------
+
+// A tile of receivers: tangents within [x0, x1] x [y0, y1], none further than disparity d; the light reaches `reach` half extents from its centre there.
+typedef struct {
+    float x0, x1, y0, y1, d;
+    float2 reach;
+} Tile;
+
+// 16 boxes of points (x / z, y / z, 1 / z): five rows of 16 floats, low x, high x, low y, high y, high 1 / z. All ones where the penumbra of something in the box
+// can meet the tile: a point casts its penumbra on receivers with |x / z - t| <= reach (1 / z - d). Widened by 2^-18 for the rounding of this test and of
+// what it spares.
+// With `use_reach` 0 for the line to the light's centre alone, as triangles are counted.
+inline int16 boxes_meet(const Tile tile, __global const float* boxes, const float use_reach)
+{
+    const float16 x0 = vload16(0, boxes), x1 = vload16(1, boxes), y0 = vload16(2, boxes), y1 = vload16(3, boxes), near = vload16(4, boxes);
+    const float16 rise = (near - tile.d) + 0x1p-18f * near;
+    const float16 margin_x = 0x1p-18f * (fabs(x0) + fabs(x1)), margin_y = 0x1p-18f * (fabs(y0) + fabs(y1));
+    const float16 ex = rise * (tile.reach.x * use_reach) + margin_x, ey = rise * (tile.reach.y * use_reach) + margin_y;
+    return (near >= tile.d) & (x1 + ex >= tile.x0) & (x0 - ex <= tile.x1) & (y1 + ey >= tile.y0) & (y0 - ey <= tile.y1);
+}
+
+// The same for 16 edges, by the wedge's own shape: six rows of 16, both ends' x / z, y / z, 1 / z. With `loose`, the wedge of Paper III, 3.1: both ends are
+// taken at the nearer one's distance, and the light as its bounding sphere (host: tile.reach).
+inline int16 edges_meet(const Tile tile, __global const float* ends, const int loose)
+{
+    const float16 ax = vload16(0, ends), ay = vload16(1, ends), ad = vload16(2, ends);
+    const float16 bx = vload16(3, ends), by = vload16(4, ends), bd = vload16(5, ends);
+    const float16 near = select(ad, bd, bd > ad), zero = (float16)(0.0f);
+    const float16 margin = 0x1p-18f * (near + fabs(ax) + fabs(bx) + fabs(ay) + fabs(by));
+    // How far the penumbra of either end reaches on the tile's furthest receivers.
+    const float16 a_rise = select(zero, (loose ? near : ad) - tile.d, ad > tile.d || loose), b_rise = select(zero, (loose ? near : bd) - tile.d, bd > tile.d || loose);
+    const float16 a_ex = a_rise * tile.reach.x + margin, b_ex = b_rise * tile.reach.x + margin, a_ey = a_rise * tile.reach.y + margin, b_ey = b_rise * tile.reach.y + margin;
+    int16 meet = (near >= tile.d) & ((ax + a_ex >= tile.x0) | (bx + b_ex >= tile.x0)) & ((ax - a_ex <= tile.x1) | (bx - b_ex <= tile.x1)) &
+                 ((ay + a_ey >= tile.y0) | (by + b_ey >= tile.y0)) & ((ay - a_ey <= tile.y1) | (by - b_ey <= tile.y1));
+    // Across the edge: the tile's middle must not be further from its line than the tile and the penumbra are wide.
+    const float16 nx = by - ay, ny = ax - bx;
+    const float mx = 0.5f * (tile.x0 + tile.x1), my = 0.5f * (tile.y0 + tile.y1), wx = 0.5f * (tile.x1 - tile.x0), wy = 0.5f * (tile.y1 - tile.y0);
+    const float16 far = fabs(nx * (mx - ax) + ny * (my - ay));
+    const float16 ex = select(a_ex, b_ex, b_ex > a_ex), ey = select(a_ey, b_ey, b_ey > a_ey);
+    meet &= far <= (fabs(nx) * (wx + ex) + fabs(ny) * (wy + ey)) * (1.0f + 0x1p-18f);
+    return meet;
+}
+
+// Which of 16 comparisons hold, as bits.
+inline uint bits_of(const int16 yes)
+{
+    const uint16 weights = (uint16)(1u, 2u, 4u, 8u, 16u, 32u, 64u, 128u, 256u, 512u, 1024u, 2048u, 4096u, 8192u, 16384u, 32768u);
+    const uint16 w = as_uint16(yes) & weights;
+    const uint8 a = w.lo | w.hi;
+    const uint4 b = a.lo | a.hi;
+    const uint2 c = b.lo | b.hi;
+    return c.x | c.y;
+}
+
+// The lowest bit's number; it is taken off.
+inline int take_bit(uint* bits)
+{
+    const int first = 31 - (int)clz(*bits & (0u - *bits));
+    *bits &= *bits - 1u;
+    return first;
+}
+
+// --- The share of the light beyond an edge ----------------------------------------------------------------------------------------------
+
+// An edge from its vertex of the lower number to the other; `weight` -1 where the silhouette passes it the other way.
+typedef struct {
+    float ax, ay, az, bx, by, bz, weight;
+} Edge;
+
+// Clips a range [from, to] of the edge to where f, which is f0 at its start and f1 at its end, is not negative.
+inline void clip(floatn* from, floatn* to, const floatn f0, const floatn f1)
+{
+    const floatn zero = (floatn)(0.0f);
+    const floatn at = f0 / (f0 - f1);
+    *from = select_lanes(*from, at, (f0 < zero) & (at > *from));
+    *to = select_lanes(*to, at, (f1 < zero) & (at < *to));
+    *to = select_lanes(*to, (floatn)(-1.0f), (f0 < zero) & (f1 < zero));
+}
+
+// What lies behind the light's plane hides nothing: the range of the edge before it. The same for all receivers of a rectangle.
+inline float2 before_light(const float az, const float bz)
+{
+    if (az < 0.0f && bz < 0.0f) return (float2)(0.0f, -1.0f);
+    const float at = az / (az - bz);
+    return (float2)(az < 0.0f ? at : 0.0f, bz < 0.0f ? at : 1.0f);
+}
+
+#if LIGHT == 0
+
+// How far around the square's border (from its right side's middle, counter-clockwise, the whole is 8) the line from the centre through (x, y) meets it.
+inline floatn around(const floatn x, const floatn y)
+{
+    const floatn zero = (floatn)(0.0f);
+    const intn side = fabs(x) >= fabs(y);
+    const floatn top = select_lanes(-x, y, side), bottom = select_lanes(y, x, side);
+    const floatn ratio = select_lanes(zero, top / bottom, bottom != zero);
+    const floatn base = select_lanes(select_lanes((floatn)(6.0f), (floatn)(2.0f), y > zero), select_lanes((floatn)(4.0f), zero, x > zero), side);
+    return base + ratio;
+}
+
+// Paper IV, Fig. 6, in closed form: the clipped edge's sector of the square less its triangle. No table: on [-1, 1]^2 a sector's area is half the length of
+// border it holds.
+inline floatn share_beyond(const Edge edge, const Receivers p)
+{
+    const floatn one = (floatn)(1.0f);
+    const floatn ax = across(edge.ax, edge.az, p.tx), ay = across(edge.ay, edge.az, p.ty), aw = fma((floatn)(-edge.az), p.d, one);
+    const floatn bx = across(edge.bx, edge.bz, p.tx), by = across(edge.by, edge.bz, p.ty), bw = fma((floatn)(-edge.bz), p.d, one);
+
+    // Clip before projecting (4.2.2): in homogeneous coordinates nothing behind the receiver is turned round.
+    const floatn zero = (floatn)(0.0f);
+    const intn out = ((aw - ax < zero) & (bw - bx < zero)) | ((aw + ax < zero) & (bw + bx < zero)) | ((aw - ay < zero) & (bw - by < zero)) |
+                     ((aw + ay < zero) & (bw + by < zero));
+#if LANES == 1
+    if (out) return 0.0f;
+#else
+    if (all(out)) return zero;
+#endif
+    const float2 range = before_light(edge.az, edge.bz);
+    floatn from = (floatn)(range.x), to = (floatn)(range.y);
+    clip(&from, &to, aw - ax, bw - bx);
+    clip(&from, &to, aw + ax, bw + bx);
+    clip(&from, &to, aw - ay, bw - by);
+    clip(&from, &to, aw + ay, bw + by);
+    const floatn dx = bx - ax, dy = by - ay, dw = bw - aw;
+    const floatn cx = fma(from, dx, ax), cy = fma(from, dy, ay), cw = fma(from, dw, aw);
+    const floatn ex = fma(to, dx, ax), ey = fma(to, dy, ay), ew = fma(to, dw, aw);
+
+    const intn left = left_of(ax, ay, bx, by);
+    floatn length = around(ex, ey) - around(cx, cy);
+    length = select_lanes(length, length + 8.0f, left & (length < (floatn)(-2.0f)));
+    length = select_lanes(length, length - 8.0f, ~left & (length > (floatn)(2.0f)));
+    const floatn triangle = fma(cx, ey, -(ex * cy)) / (cw * ew);
+    const floatn share = (length - triangle) * 0.125f;
+    return select_lanes(zero, share, (to > from) & ~out & (cw > zero) & (ew > zero));
+}
+
+#else
+
+// Paper IV, 4.2.1 and Figs. 3 to 5: the edge is clipped with the cone of the receiver and the disc that faces it, then a sector less a triangle.
+inline floatn share_beyond(const Edge edge, const Receivers p)
+{
+    const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
+    // A frame whose third axis w points from the light's centre to the receiver (Duff et al. 2017, without the branch: w.z is not negative).
+    const floatn shorter = 1.0f / sqrt(fma(p.tx, p.tx, fma(p.ty, p.ty, one)));
+    const floatn wx = p.tx * shorter, wy = p.ty * shorter, wz = shorter;
+    const floatn s = -1.0f / (one + wz), m = wx * wy * s;
+    const floatn ux = fma(wx * wx, s, one), uy = m, uz = -wx, vx = m, vy = fma(wy * wy, s, one), vz = -wy;
+    // Each end: in the disc's plane, and how near: w = 1 - e.w / |p|, |p| = 1 / (d shorter). X = e.u: the same as of e - t z, which has lost its common part.
+    const floatn fax = across(edge.ax, edge.az, p.tx), fay = across(edge.ay, edge.az, p.ty);
+    const floatn fbx = across(edge.bx, edge.bz, p.tx), fby = across(edge.by, edge.bz, p.ty);
+    const floatn ax = fma(fax, ux, fay * uy), ay = fma(fax, vx, fay * vy), bx = fma(fbx, ux, fby * uy), by = fma(fbx, vx, fby * vy);
+    const floatn depth = p.d * shorter;
+    const floatn a_along = fma(fax, wx, fay * wy) + edge.az / shorter, b_along = fma(fbx, wx, fby * wy) + edge.bz / shorter;
+    const floatn aw = fma(-a_along, depth, one), bw = fma(-b_along, depth, one);
+
+    // Between the disc and the receiver, then inside the cone x^2 + y^2 <= w^2: A t^2 + 2 B t + C <= 0.
+    floatn from = zero, to = one;
+    clip(&from, &to, a_along, b_along);
+    clip(&from, &to, aw, bw);
+    const floatn dx = bx - ax, dy = by - ay, dw = bw - aw;
+    const floatn A = fma(dx, dx, fma(dy, dy, -(dw * dw))), B = fma(ax, dx, fma(ay, dy, -(aw * dw))), C = fma(ax, ax, fma(ay, ay, -(aw * aw)));
+    const floatn square = fma(B, B, -(A * C));
+    const intn real = square >= zero;
+    const floatn root = sqrt(select_lanes(zero, square, real));
+    // Roots without cancellation; the lower and the higher.
+    const floatn q = select_lanes(root - B, -(B + root), B > zero);
+    const floatn r0 = q / A, r1 = C / q;
+    const floatn low = select_lanes(r1, r0, r0 < r1), high = select_lanes(r0, r1, r0 < r1);
+    // The line enters and leaves the cone (A > 0), or stays in it once it is in (A < 0), towards where w grows.
+    const intn crosses = A > zero;
+    const floatn cone_from = select_lanes(select_lanes((floatn)(-1.0f), high, dw > zero), low, crosses);
+    const floatn cone_to = select_lanes(select_lanes(low, (floatn)(2.0f), dw > zero), high, crosses);
+    from = select_lanes(from, cone_from, cone_from > from);
+    to = select_lanes(to, cone_to, cone_to < to);
+    const intn meets = (to > from) & (real | ~crosses);
+#if LANES == 1
+    if (!meets) return 0.0f;
+#else
+    if (!any(meets)) return zero;
+#endif
+    const floatn cx = fma(from, dx, ax), cy = fma(from, dy, ay), cw = fma(from, dw, aw);
+    const floatn ex = fma(to, dx, ax), ey = fma(to, dy, ay), ew = fma(to, dw, aw);
+    const floatn turn = fma(cx, ey, -(ex * cy));
+    const intn left = left_of(fax, fay, fbx, fby);
+    floatn angle = atan2(turn, fma(cx, ex, cy * ey));
+    angle = select_lanes(angle, angle + 6.283185307f, left & (angle < (floatn)(-1.570796327f)));
+    angle = select_lanes(angle, angle - 6.283185307f, ~left & (angle > (floatn)(1.570796327f)));
+    const floatn share = (angle - turn / (cw * ew)) * 0.1591549431f;
+    return select_lanes(zero, share, meets & (cw > zero) & (ew > zero));
+}
+
+#endif
+
+// --- Accumulators -----------------------------------------------------------------------------------------------------------------------
+
+// A receiver's occlusion by one sheet, in the buffer that ACCUMULATOR says.
+#if ACCUMULATOR == 0
+
+typedef struct {
+    floatn sum;
+} Sum;
+inline void clear(Sum* s) { s->sum = (floatn)(0.0f); }
+inline void add_hard(Sum* s, const intn behind) { s->sum += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
+inline void add_share(Sum* s, const floatn share) { s->sum -= share; }
+inline floatn occlusion_of(const Sum* s) { return s->sum; }
+
+#elif ACCUMULATOR == 1
+
+// Paper I, section 4: shares times 255, rounded, in a signed 16-bit buffer, which holds what it can.
+typedef struct {
+    floatn sum;
+} Sum;
+inline void clear(Sum* s) { s->sum = (floatn)(0.0f); }
+inline void add(Sum* s, const floatn levels) { s->sum = clamp(s->sum + levels, (floatn)(-32768.0f), (floatn)(32767.0f)); }
+inline void add_hard(Sum* s, const intn behind) { add(s, select_lanes((floatn)(0.0f), (floatn)(255.0f), behind)); }
+inline void add_share(Sum* s, const floatn share) { add(s, -rint(share * 255.0f)); }
+inline floatn occlusion_of(const Sum* s) { return s->sum * (1.0f / 255.0f); }
+
+#elif ACCUMULATOR == 2
+
+// Paper III, 4.2: 64 levels; what adds and what subtracts has an 8-bit channel each, so that two bits are left for overlap. Hard shadows: the stencil buffer.
+typedef struct {
+    floatn hard, more, less;
+} Sum;
+inline void clear(Sum* s) { s->hard = s->more = s->less = (floatn)(0.0f); }
+inline void add_hard(Sum* s, const intn behind) { s->hard += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
+inline void add_share(Sum* s, const floatn share)
+{
+    const floatn level = rint(share * 63.0f), zero = (floatn)(0.0f), most = (floatn)(255.0f);
+    s->more = clamp(s->more + select_lanes(zero, -level, level < zero), zero, most);
+    s->less = clamp(s->less + select_lanes(zero, level, level > zero), zero, most);
+}
+inline floatn occlusion_of(const Sum* s) { return s->hard + (s->more - s->less) * (1.0f / 63.0f); }
+
+#else
+
+// Paper IV, 4.3: twelve bits, three in each of four 8-bit channels, the upper five left for overlap; a buffer each for what adds and what subtracts.
+typedef struct {
+    floatn hard, more[4], less[4];
+} Sum;
+inline void clear(Sum* s)
+{
+    s->hard = (floatn)(0.0f);
+    for (int i = 0; i < 4; ++i) s->more[i] = s->less[i] = (floatn)(0.0f);
+}
+inline void add_hard(Sum* s, const intn behind) { s->hard += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
+inline void add_share(Sum* s, const floatn share)
+{
+    const floatn zero = (floatn)(0.0f), most = (floatn)(255.0f);
+    floatn level = rint(fabs(share) * 4095.0f);
+    for (int i = 0; i < 4; ++i) {
+        const floatn higher = floor(level * 0.125f), digit = level - higher * 8.0f;
+        s->more[i] = clamp(s->more[i] + select_lanes(zero, digit, share < zero), zero, most);
+        s->less[i] = clamp(s->less[i] + select_lanes(zero, digit, share > zero), zero, most);
+        level = higher;
+    }
+}
+inline floatn occlusion_of(const Sum* s)
+{
+    floatn levels = (floatn)(0.0f), weight = (floatn)(1.0f);
+    for (int i = 0; i < 4; ++i) {
+        levels += (s->more[i] - s->less[i]) * weight;
+        weight *= 8.0f;
+    }
+    return s->hard + levels * (1.0f / 4095.0f);
+}
+
+#endif
+
+// --- Shading ------------------------------------------------------------------------------------------------------------------------------
+
+inline Receivers receivers_at(const WedgeLight light, const int stride, __global const float* xi, __global const float* eta, __global const float* d,
+                              const int x, const int y)
+{
+    const int at = y * stride + x;
+    Receivers p;
+    p.d = load_lanes(d + at) * light.scale_d;
+    // Seen from the part's centre instead of the whole light's: t' = (p - c) / p.z.
+    p.tx = fma((floatn)(-light.centre_x), p.d, load_lanes(xi + at) * light.scale_x);
+    p.ty = fma((floatn)(-light.centre_y), p.d, load_lanes(eta + at) * light.scale_y);
+    return p;
+}
+
+// Where a triangle lies between the receivers and the light's centre. Row of 16 floats: the vertices a, b, c in order of their numbers; the plane's disparity
+// 1 / z = n.x t.x + n.y t.y + n.z; 1 where a, b, c turn counter-clockwise, seen from the light, else -1.
+inline intn behind_triangle(__global const float* triangle, const WedgeLight light, const Receivers p)
+{
+    const float nx = triangle[9], ny = triangle[10], nz = triangle[11];
+    // Nearer to the light than the receiver by more than rounding and bias explain: of the plane's three terms, of the receiver's place, and of its depth.
+    const floatn near = fma((floatn)(nx), p.tx, fma((floatn)(ny), p.ty, (floatn)(nz)));
+    const floatn place = fma((floatn)(light.position_error), p.d, 0x1p-22f * (fabs(p.tx) + fabs(p.ty)));
+    const floatn rounding = 0x1p-22f * (fabs(nx) * fabs(p.tx) + fabs(ny) * fabs(p.ty) + fabs(nz)) + (fabs(nx) + fabs(ny)) * place;
+    const floatn limit = p.d + ((0x1p-22f + 2.0f * light.precision) * p.d + rounding + (fabs(nx) * light.bias_x + fabs(ny) * light.bias_y));
+    const intn before = near > limit;
+#if LANES == 1
+    if (!before) return 0;
+#else
+    if (!any(before)) return before;
+#endif
+    const floatn ax = across(triangle[0], triangle[2], p.tx), ay = across(triangle[1], triangle[2], p.ty);
+    const floatn bx = across(triangle[3], triangle[5], p.tx), by = across(triangle[4], triangle[5], p.ty);
+    const floatn cx = across(triangle[6], triangle[8], p.tx), cy = across(triangle[7], triangle[8], p.ty);
+    const intn ab = left_of(ax, ay, bx, by), bc = left_of(bx, by, cx, cy), ac = left_of(ax, ay, cx, cy);
+#if LANES == 1
+    return triangle[12] > 0.0f ? ab && bc && !ac : !ab && !bc && ac;
+#else
+    return before & (triangle[12] > 0.0f ? ab & bc & ~ac : ~ab & ~bc & ac);
+#endif
+}
+
+// The tile's box, in the part's half extents. `eye`: see below.
+inline Tile tile_of(const float8 box, const WedgeLight light, const float4 eye)
+{
+    Tile tile;
+    // x0 = least xi - centre * d over the tile, whichever end of d gives it.
+    const float d0 = box.s4 * light.scale_d, d1 = box.s5 * light.scale_d;
+    const float2 shift0 = (float2)(light.centre_x, light.centre_y) * d0, shift1 = (float2)(light.centre_x, light.centre_y) * d1;
+    tile.x0 = box.s0 * light.scale_x - fmax(shift0.x, shift1.x);
+    tile.x1 = box.s1 * light.scale_x - fmin(shift0.x, shift1.x);
+    tile.y0 = box.s2 * light.scale_y - fmax(shift0.y, shift1.y);
+    tile.y1 = box.s3 * light.scale_y - fmin(shift0.y, shift1.y);
+    tile.d = d0;
+    if (eye.w > 0.0f) {
+        tile.x0 = fmin(tile.x0, eye.x);
+        tile.x1 = fmax(tile.x1, eye.x);
+        tile.y0 = fmin(tile.y0, eye.y);
+        tile.y1 = fmax(tile.y1, eye.y);
+        tile.d = fmin(tile.d, eye.z);
+    }
+    tile.reach = (float2)(light.reach_x, light.reach_y);
+#if LIGHT == 1
+    // The disc that faces a receiver is tilted: a line that passes the centre within the radius meets the plane z = 0 within q, q <= (1 + t + q d), as the line's
+    // own tangent is below t + q d. No bound, so no culling, where the receiver may be as near as the radius.
+    const float t = fmax(fabs(tile.x0), fabs(tile.x1)) + fmax(fabs(tile.y0), fabs(tile.y1));
+    tile.reach *= d1 < 0.984375f ? (1.0f + t) / (1.0f - d1) : 0x1p60f;
+#endif
+    return tile;
+}
+
+// Which of the 16 boxes from `boxes` on are to be looked at; only those numbered `first` to below `last`.
+inline uint chosen(const Tile tile, __global const float* boxes, const int culling, const float use_reach, const int first, const int last)
+{
+    const uint below = last >= 16 ? 0xffffu : (1u << last) - 1u;
+    const uint above = first <= 0 ? 0xffffu : ~((1u << first) - 1u);
+    return below & above & (culling == 0 ? 0xffffu : bits_of(boxes_meet(tile, boxes, use_reach)));
+}
+
+// Between which tangents y a row's receivers lie. Without one: nowhere.
+inline float2 span_of(const Receivers p)
+{
+    float y[LANES], d[LANES];
+    store_lanes(p.ty, y);
+    store_lanes(p.d, d);
+    float2 span = (float2)(0x1p60f, -0x1p60f);
+    for (int lane = 0; lane < LANES; ++lane)
+        if (d[lane] < 0x1p120f) span = (float2)(fmin(span.x, y[lane]), fmax(span.y, y[lane]));
+    return span;
+}
+
+// Joins a sheet's occlusion to that of the sheets before (Paper IV, 5.1: Eq. 1 is half_min).
+inline floatn joined(const floatn before, const floatn sheet, const int overlap)
+{
+    const floatn one = saturate(sheet);
+    const intn bigger = one > before;
+    const floatn more = select_lanes(before, one, bigger), less = select_lanes(one, before, bigger);
+    if (overlap == 1) return more;
+    if (overlap == 2) return saturate(fma(less, (floatn)(0.5f), more));
+    return fma(-before, one, before + one);
+}
+
+inline void write_visibility(__global float* to, const floatn seen, const int left, const int add)
+{
+    if (left >= LANES) {
+        store_lanes(add ? load_lanes(to) + seen : seen, to);
+        return;
+    }
+    float lanes[LANES];
+    store_lanes(seen, lanes);
+    for (int lane = 0; lane < left; ++lane) to[lane] = add ? to[lane] + lanes[lane] : lanes[lane];
+}
+
+// soft_shadow_volume: one light, or one part of it.
+//
+//   sheet_boxes, edge_boxes, triangle_boxes   boxes (boxes_meet) of sheets, and of groups of WEDGE_GROUP edges or triangles; blocks of 16 boxes
+//   edge_ends [groups][6][16]                 ends of edges (edges_meet)
+//   edges [groups][16][8]                     Edge, and padding
+//   triangle_extents [groups][5][16]          boxes of single triangles
+//   triangles [groups][16][16]                behind_triangle
+//   visibility [height][width]                share of the light that is seen, 0 to 1
+//   evaluated [tiles][2]                      edges, and triangles, that were evaluated against the tile's receivers; added to with further parts
+//
+// `eye`: with w 1, the receivers' camera in light space (tangents in half extents, disparity): tiles are then bounded by it and by their furthest receivers,
+// which is what one depth a tile can tell (Paper II, section 4, for comparison).
+//
+// Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Edges and triangles are added in one order, whatever the tile and the culling.
+__kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light, const float4 eye, __global const Sheet* restrict sheets,
+                                 __global const float* restrict sheet_boxes, __global const float* restrict edge_boxes,
+                                 __global const float* restrict edge_ends, __global const float* restrict edges, __global const float* restrict triangle_boxes,
+                                 __global const float* restrict triangle_extents, __global const float* restrict triangles,
+                                 __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
+                                 __global const float* restrict d, __global float* restrict visibility, __global uint2* restrict evaluated)
+{
+    const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
+    if (x >= view.stride || y >= view.rows) return;
+    const int number = (y / TILE_ROWS) * (view.stride / TILE_WIDTH) + x / TILE_WIDTH;
+    const bool empty = bounds[number].s6 == 0.0f;
+    const Tile tile = tile_of(bounds[number], light, eye);
+
+    floatn occlusion[ITEM_ROWS];
+    for (int row = 0; row < ITEM_ROWS; ++row) occlusion[row] = (floatn)(0.0f);
+    uint2 count = (uint2)(0);
+    float2 spans[ITEM_ROWS];
+    for (int row = 0; row < ITEM_ROWS && !empty; ++row) spans[row] = span_of(receivers_at(light, view.stride, xi, eta, d, x, y + row));
+
+    for (int block = 0; block < light.sheets && !empty; block += 16) {
+        uint sheet_bits = chosen(tile, sheet_boxes + block * 5, light.culling, 1.0f, 0, light.sheets - block);
+        while (sheet_bits) {
+            const Sheet sheet = sheets[block + take_bit(&sheet_bits)];
+            Sum sums[ITEM_ROWS];
+            for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[row]);
+
+            for (int groups = sheet.triangles_begin & ~15; groups < sheet.triangles_end; groups += 16) {
+                uint group_bits = chosen(tile, triangle_boxes + groups * 5, light.culling, 0.0f, sheet.triangles_begin - groups, sheet.triangles_end - groups);
+                while (group_bits) {
+                    const int group = groups + take_bit(&group_bits);
+                    uint bits = chosen(tile, triangle_extents + group * 80, light.culling, 0.0f, 0, 16);
+                    while (bits) {
+                        const int i = take_bit(&bits);
+                        __global const float* triangle = triangles + (group * 16 + i) * 16;
+                        // Triangles are often smaller than a tile: only rows that they reach.
+                        const float low = triangle_extents[group * 80 + 32 + i], high = triangle_extents[group * 80 + 48 + i];
+                        const float margin = 0x1p-18f * (fabs(low) + fabs(high));
+                        ++count.y;
+                        for (int row = 0; row < ITEM_ROWS; ++row)
+                            if (light.culling == 0 || (high + margin >= spans[row].x && low - margin <= spans[row].y))
+                                add_hard(&sums[row], behind_triangle(triangle, light, receivers_at(light, view.stride, xi, eta, d, x, y + row)));
+                    }
+                }
+            }
+
+            for (int groups = sheet.edges_begin & ~15; groups < sheet.edges_end; groups += 16) {
+                uint group_bits = chosen(tile, edge_boxes + groups * 5, light.culling, 1.0f, sheet.edges_begin - groups, sheet.edges_end - groups);
+                while (group_bits) {
+                    const int group = groups + take_bit(&group_bits);
+                    uint bits = light.culling == 0 ? 0xffffu : bits_of(edges_meet(tile, edge_ends + group * 96, light.culling == 1));
+                    while (bits) {
+                        const float8 e = vload8(group * 16 + take_bit(&bits), edges);
+                        const Edge edge = {e.s0, e.s1, e.s2, e.s3, e.s4, e.s5, e.s6};
+                        ++count.x;
+                        for (int row = 0; row < ITEM_ROWS; ++row)
+                            add_share(&sums[row], edge.weight * share_beyond(edge, receivers_at(light, view.stride, xi, eta, d, x, y + row)));
+                    }
+                }
+            }
+
+            for (int row = 0; row < ITEM_ROWS; ++row)
+                occlusion[row] = light.overlap == 0 ? occlusion[row] + occlusion_of(&sums[row]) : joined(occlusion[row], occlusion_of(&sums[row]), light.overlap);
+        }
+    }
+
+    for (int row = 0; row < ITEM_ROWS && y + row < view.height; ++row)
+        write_visibility(visibility + (y + row) * view.width + x, light.share * (1.0f - saturate(occlusion[row])), view.width - x, !light.first);
+    if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[number] = light.first ? count : evaluated[number] + count;
+}
