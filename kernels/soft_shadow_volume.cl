@@ -11,6 +11,7 @@
 //   LANES, ITEM_ROWS, TILE_ROWS   as in soft_shadow_map.cl
 //   LIGHT        0 rectangle, 1 sphere (the disc that faces the receiver)
 //   COVERAGE     0 linear (Paper I), 1 analytic (Paper IV, 4.2), 2 texture (Paper III, 3.3)
+//   CHANNELS     of the light: 1, or 3 for a coloured texture
 //   ACCUMULATOR  0 binary32; the papers' buffers, emulated: 1 signed 16 bits with 255 levels (Paper I), 2 six bits (Paper III), 3 twelve bits (Paper IV)
 //
 // Light space here: x and y in the light's half extents (its radius: z as well), so that the light is [-1, 1]^2 or the unit disc. A receiver is its tangents
@@ -132,111 +133,25 @@ inline float2 before_light(const float az, const float bz)
     return (float2)(az < 0.0f ? at : 0.0f, bz < 0.0f ? at : 1.0f);
 }
 
-#if LIGHT == 0
-
-// How far around the square's border (from its right side's middle, counter-clockwise, the whole is 8) the line from the centre through (x, y) meets it.
-inline floatn around(const floatn x, const floatn y)
-{
-    const floatn zero = (floatn)(0.0f);
-    const intn side = fabs(x) >= fabs(y);
-    const floatn top = select_lanes(-x, y, side), bottom = select_lanes(y, x, side);
-    const floatn ratio = select_lanes(zero, top / bottom, bottom != zero);
-    const floatn base = select_lanes(select_lanes((floatn)(6.0f), (floatn)(2.0f), y > zero), select_lanes((floatn)(4.0f), zero, x > zero), side);
-    return base + ratio;
-}
-
-// Paper IV, Fig. 6, in closed form: the clipped edge's sector of the square less its triangle. No table: on [-1, 1]^2 a sector's area is half the length of
-// border it holds.
-inline floatn share_beyond(const Edge edge, const Receivers p)
-{
-    const floatn one = (floatn)(1.0f);
-    const floatn ax = across(edge.ax, edge.az, p.tx), ay = across(edge.ay, edge.az, p.ty), aw = fma((floatn)(-edge.az), p.d, one);
-    const floatn bx = across(edge.bx, edge.bz, p.tx), by = across(edge.by, edge.bz, p.ty), bw = fma((floatn)(-edge.bz), p.d, one);
-
-    // Clip before projecting (4.2.2): in homogeneous coordinates nothing behind the receiver is turned round.
-    const floatn zero = (floatn)(0.0f);
-    const intn out = ((aw - ax < zero) & (bw - bx < zero)) | ((aw + ax < zero) & (bw + bx < zero)) | ((aw - ay < zero) & (bw - by < zero)) |
-                     ((aw + ay < zero) & (bw + by < zero));
-#if LANES == 1
-    if (out) return 0.0f;
+#if COVERAGE == 0
+#include "common/wedge_linear.clh"
+#elif COVERAGE == 1
+#include "common/wedge_analytic.clh"
 #else
-    if (all(out)) return zero;
+#include "common/wedge_table.clh"
 #endif
-    const float2 range = before_light(edge.az, edge.bz);
-    floatn from = (floatn)(range.x), to = (floatn)(range.y);
-    clip(&from, &to, aw - ax, bw - bx);
-    clip(&from, &to, aw + ax, bw + bx);
-    clip(&from, &to, aw - ay, bw - by);
-    clip(&from, &to, aw + ay, bw + by);
-    const floatn dx = bx - ax, dy = by - ay, dw = bw - aw;
-    const floatn cx = fma(from, dx, ax), cy = fma(from, dy, ay), cw = fma(from, dw, aw);
-    const floatn ex = fma(to, dx, ax), ey = fma(to, dy, ay), ew = fma(to, dw, aw);
 
-    const intn left = left_of(ax, ay, bx, by);
-    floatn length = around(ex, ey) - around(cx, cy);
-    length = select_lanes(length, length + 8.0f, left & (length < (floatn)(-2.0f)));
-    length = select_lanes(length, length - 8.0f, ~left & (length > (floatn)(2.0f)));
-    const floatn triangle = fma(cx, ey, -(ex * cy)) / (cw * ew);
-    const floatn share = (length - triangle) * 0.125f;
-    return select_lanes(zero, share, (to > from) & ~out & (cw > zero) & (ew > zero));
-}
-
-#else
-
-// Paper IV, 4.2.1 and Figs. 3 to 5: the edge is clipped with the cone of the receiver and the disc that faces it, then a sector less a triangle.
-inline floatn share_beyond(const Edge edge, const Receivers p)
+// The share beyond edge number `index` in each channel of the light. `data`: what the coverage keeps beside the edges.
+inline void shares_beyond(floatn* shares, const Edge edge, const int index, const Receivers p, __global const float* data, const int size)
 {
-    const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
-    // A frame whose third axis w points from the light's centre to the receiver (Duff et al. 2017, without the branch: w.z is not negative).
-    const floatn shorter = 1.0f / sqrt(fma(p.tx, p.tx, fma(p.ty, p.ty, one)));
-    const floatn wx = p.tx * shorter, wy = p.ty * shorter, wz = shorter;
-    const floatn s = -1.0f / (one + wz), m = wx * wy * s;
-    const floatn ux = fma(wx * wx, s, one), uy = m, uz = -wx, vx = m, vy = fma(wy * wy, s, one), vz = -wy;
-    // Each end: in the disc's plane, and how near: w = 1 - e.w / |p|, |p| = 1 / (d shorter). X = e.u: the same as of e - t z, which has lost its common part.
-    const floatn fax = across(edge.ax, edge.az, p.tx), fay = across(edge.ay, edge.az, p.ty);
-    const floatn fbx = across(edge.bx, edge.bz, p.tx), fby = across(edge.by, edge.bz, p.ty);
-    const floatn ax = fma(fax, ux, fay * uy), ay = fma(fax, vx, fay * vy), bx = fma(fbx, ux, fby * uy), by = fma(fbx, vx, fby * vy);
-    const floatn depth = p.d * shorter;
-    const floatn a_along = fma(fax, wx, fay * wy) + edge.az / shorter, b_along = fma(fbx, wx, fby * wy) + edge.bz / shorter;
-    const floatn aw = fma(-a_along, depth, one), bw = fma(-b_along, depth, one);
-
-    // Between the disc and the receiver, then inside the cone x^2 + y^2 <= w^2: A t^2 + 2 B t + C <= 0.
-    floatn from = zero, to = one;
-    clip(&from, &to, a_along, b_along);
-    clip(&from, &to, aw, bw);
-    const floatn dx = bx - ax, dy = by - ay, dw = bw - aw;
-    const floatn A = fma(dx, dx, fma(dy, dy, -(dw * dw))), B = fma(ax, dx, fma(ay, dy, -(aw * dw))), C = fma(ax, ax, fma(ay, ay, -(aw * aw)));
-    const floatn square = fma(B, B, -(A * C));
-    const intn real = square >= zero;
-    const floatn root = sqrt(select_lanes(zero, square, real));
-    // Roots without cancellation; the lower and the higher.
-    const floatn q = select_lanes(root - B, -(B + root), B > zero);
-    const floatn r0 = q / A, r1 = C / q;
-    const floatn low = select_lanes(r1, r0, r0 < r1), high = select_lanes(r0, r1, r0 < r1);
-    // The line enters and leaves the cone (A > 0), or stays in it once it is in (A < 0), towards where w grows.
-    const intn crosses = A > zero;
-    const floatn cone_from = select_lanes(select_lanes((floatn)(-1.0f), high, dw > zero), low, crosses);
-    const floatn cone_to = select_lanes(select_lanes(low, (floatn)(2.0f), dw > zero), high, crosses);
-    from = select_lanes(from, cone_from, cone_from > from);
-    to = select_lanes(to, cone_to, cone_to < to);
-    const intn meets = (to > from) & (real | ~crosses);
-#if LANES == 1
-    if (!meets) return 0.0f;
+#if COVERAGE == 0
+    shares[0] = share_by_planes(edge, data + index * WEDGE_PLANES, p);
+#elif COVERAGE == 1
+    shares[0] = share_beyond(edge, p);
 #else
-    if (!any(meets)) return zero;
+    shares_by_table(shares, edge, p, data, size);
 #endif
-    const floatn cx = fma(from, dx, ax), cy = fma(from, dy, ay), cw = fma(from, dw, aw);
-    const floatn ex = fma(to, dx, ax), ey = fma(to, dy, ay), ew = fma(to, dw, aw);
-    const floatn turn = fma(cx, ey, -(ex * cy));
-    const intn left = left_of(fax, fay, fbx, fby);
-    floatn angle = atan2(turn, fma(cx, ex, cy * ey));
-    angle = select_lanes(angle, angle + 6.283185307f, left & (angle < (floatn)(-1.570796327f)));
-    angle = select_lanes(angle, angle - 6.283185307f, ~left & (angle > (floatn)(1.570796327f)));
-    const floatn share = (angle - turn / (cw * ew)) * 0.1591549431f;
-    return select_lanes(zero, share, meets & (cw > zero) & (ew > zero));
 }
-
-#endif
 
 // --- Accumulators -----------------------------------------------------------------------------------------------------------------------
 
@@ -417,13 +332,14 @@ inline floatn joined(const floatn before, const floatn sheet, const int overlap)
 
 inline void write_visibility(__global float* to, const floatn seen, const int left, const int add)
 {
-    if (left >= LANES) {
+    if (left >= LANES && CHANNELS == 1) {
         store_lanes(add ? load_lanes(to) + seen : seen, to);
         return;
     }
     float lanes[LANES];
     store_lanes(seen, lanes);
-    for (int lane = 0; lane < left; ++lane) to[lane] = add ? to[lane] + lanes[lane] : lanes[lane];
+    const int count = left < LANES ? left : LANES;
+    for (int lane = 0; lane < count; ++lane) to[lane * CHANNELS] = add ? to[lane * CHANNELS] + lanes[lane] : lanes[lane];
 }
 
 // soft_shadow_volume: one light, or one part of it.
@@ -433,7 +349,8 @@ inline void write_visibility(__global float* to, const floatn seen, const int le
 //   edges [groups][16][8]                     Edge, and padding
 //   triangle_extents [groups][5][16]          boxes of single triangles
 //   triangles [groups][16][16]                behind_triangle
-//   visibility [height][width]                share of the light that is seen, 0 to 1
+//   visibility [height][width][CHANNELS]      share of the light that is seen, 0 to 1
+//   coverage, coverage_size                   linear: the wedges' planes; texture: the table and its n; else nothing
 //   evaluated [tiles][2]                      edges, and triangles, that were evaluated against the tile's receivers; added to with further parts
 //
 // `eye`: with w 1, the receivers' camera in light space (tangents in half extents, disparity): tiles are then bounded by it and by their furthest receivers,
@@ -445,7 +362,8 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                                  __global const float* restrict edge_ends, __global const float* restrict edges, __global const float* restrict triangle_boxes,
                                  __global const float* restrict triangle_extents, __global const float* restrict triangles,
                                  __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
-                                 __global const float* restrict d, __global float* restrict visibility, __global uint2* restrict evaluated)
+                                 __global const float* restrict d, __global float* restrict visibility, __global uint2* restrict evaluated, __global const float* restrict coverage,
+                                 const int coverage_size)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= view.stride || y >= view.rows) return;
@@ -453,8 +371,9 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
     const bool empty = bounds[number].s6 == 0.0f;
     const Tile tile = tile_of(bounds[number], light, eye);
 
-    floatn occlusion[ITEM_ROWS];
-    for (int row = 0; row < ITEM_ROWS; ++row) occlusion[row] = (floatn)(0.0f);
+    floatn occlusion[CHANNELS][ITEM_ROWS];
+    for (int channel = 0; channel < CHANNELS; ++channel)
+        for (int row = 0; row < ITEM_ROWS; ++row) occlusion[channel][row] = (floatn)(0.0f);
     uint2 count = (uint2)(0);
     float2 spans[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS && !empty; ++row) spans[row] = span_of(receivers_at(light, view.stride, xi, eta, d, x, y + row));
@@ -463,8 +382,9 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
         uint sheet_bits = chosen(tile, sheet_boxes + block * 5, light.culling, 1.0f, 0, light.sheets - block);
         while (sheet_bits) {
             const Sheet sheet = sheets[block + take_bit(&sheet_bits)];
-            Sum sums[ITEM_ROWS];
-            for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[row]);
+            Sum sums[CHANNELS][ITEM_ROWS];
+            for (int channel = 0; channel < CHANNELS; ++channel)
+                for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[channel][row]);
 
             for (int groups = sheet.triangles_begin & ~15; groups < sheet.triangles_end; groups += 16) {
                 uint group_bits = chosen(tile, triangle_boxes + groups * 5, light.culling, 0.0f, sheet.triangles_begin - groups, sheet.triangles_end - groups);
@@ -479,8 +399,10 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                         const float margin = 0x1p-18f * (fabs(low) + fabs(high));
                         ++count.y;
                         for (int row = 0; row < ITEM_ROWS; ++row)
-                            if (light.culling == 0 || (high + margin >= spans[row].x && low - margin <= spans[row].y))
-                                add_hard(&sums[row], behind_triangle(triangle, light, receivers_at(light, view.stride, xi, eta, d, x, y + row)));
+                            if (light.culling == 0 || (high + margin >= spans[row].x && low - margin <= spans[row].y)) {
+                                const intn behind = behind_triangle(triangle, light, receivers_at(light, view.stride, xi, eta, d, x, y + row));
+                                for (int channel = 0; channel < CHANNELS; ++channel) add_hard(&sums[channel][row], behind);
+                            }
                     }
                 }
             }
@@ -491,21 +413,30 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                     const int group = groups + take_bit(&group_bits);
                     uint bits = light.culling == 0 ? 0xffffu : bits_of(edges_meet(tile, edge_ends + group * 96, light.culling == 1));
                     while (bits) {
-                        const float8 e = vload8(group * 16 + take_bit(&bits), edges);
+                        const int index = group * 16 + take_bit(&bits);
+                        const float8 e = vload8(index, edges);
                         const Edge edge = {e.s0, e.s1, e.s2, e.s3, e.s4, e.s5, e.s6};
                         ++count.x;
-                        for (int row = 0; row < ITEM_ROWS; ++row)
-                            add_share(&sums[row], edge.weight * share_beyond(edge, receivers_at(light, view.stride, xi, eta, d, x, y + row)));
+                        for (int row = 0; row < ITEM_ROWS; ++row) {
+                            floatn shares[CHANNELS];
+                            shares_beyond(shares, edge, index, receivers_at(light, view.stride, xi, eta, d, x, y + row), coverage, coverage_size);
+                            for (int channel = 0; channel < CHANNELS; ++channel) add_share(&sums[channel][row], edge.weight * shares[channel]);
+                        }
                     }
                 }
             }
 
-            for (int row = 0; row < ITEM_ROWS; ++row)
-                occlusion[row] = light.overlap == 0 ? occlusion[row] + occlusion_of(&sums[row]) : joined(occlusion[row], occlusion_of(&sums[row]), light.overlap);
+            for (int channel = 0; channel < CHANNELS; ++channel)
+                for (int row = 0; row < ITEM_ROWS; ++row) {
+                    const floatn sheet_occlusion = occlusion_of(&sums[channel][row]), before = occlusion[channel][row];
+                    occlusion[channel][row] = light.overlap == 0 ? before + sheet_occlusion : joined(before, sheet_occlusion, light.overlap);
+                }
         }
     }
 
-    for (int row = 0; row < ITEM_ROWS && y + row < view.height; ++row)
-        write_visibility(visibility + (y + row) * view.width + x, light.share * (1.0f - saturate(occlusion[row])), view.width - x, !light.first);
+    for (int channel = 0; channel < CHANNELS; ++channel)
+        for (int row = 0; row < ITEM_ROWS && y + row < view.height; ++row)
+            write_visibility(visibility + ((y + row) * view.width + x) * CHANNELS + channel, light.share * (1.0f - saturate(occlusion[channel][row])),
+                             view.width - x, !light.first);
     if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[number] = light.first ? count : evaluated[number] + count;
 }

@@ -24,6 +24,8 @@ opencl::Specialisation SoftShadowVolumeConstants::specialisation() const
              {"ITEM_ROWS", std::to_string(item_rows)},
              {"TILE_ROWS", std::to_string(rows)},
              {"LIGHT", std::to_string(light)},
+             {"COVERAGE", std::to_string(coverage)},
+             {"CHANNELS", std::to_string(channels)},
              {"ACCUMULATOR", std::to_string(accumulator)}}};
 }
 

@@ -41,6 +41,8 @@ struct SoftShadowVolumeConstants {
     int item_rows = tile_rows;
     int rows = tile_rows;
     int light = 0;       // 0 rectangle, 1 disc
+    int coverage = 1;    // in the order of Coverage
+    int channels = 1;    // of the light
     int accumulator = 0; // in the order of WedgeBuffer
     opencl::Specialisation specialisation() const;
 };

@@ -159,7 +159,7 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
                     width * height * 16 + part.triangles.bytes() + part.edges.bytes(), view, light,
                     eye_of(view, light, prepared.settings.culling == WedgeCulling::far_depth), part.sheets, part.sheet_boxes,
                     part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_extents, part.triangles, bounds,
-                    receivers.xi, receivers.eta, receivers.d, visibility, evaluated);
+                    receivers.xi, receivers.eta, receivers.d, visibility, evaluated, opencl::Buffer<float>{}, cl_int{0});
     }
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
