@@ -254,11 +254,7 @@ inline intn behind_triangle(__global const float* triangle, const WedgeLight lig
     const floatn rounding = 0x1p-22f * (fabs(nx) * fabs(p.tx) + fabs(ny) * fabs(p.ty) + fabs(nz)) + (fabs(nx) + fabs(ny)) * place;
     const floatn limit = p.d + ((0x1p-22f + 2.0f * light.precision) * p.d + rounding + (fabs(nx) * light.bias_x + fabs(ny) * light.bias_y));
     const intn before = near > limit;
-#if LANES == 1
-    if (!before) return 0;
-#else
-    if (!any(before)) return before;
-#endif
+    if (NONE(before)) return before;
     const floatn ax = across(triangle[0], triangle[2], p.tx), ay = across(triangle[1], triangle[2], p.ty);
     const floatn bx = across(triangle[3], triangle[5], p.tx), by = across(triangle[4], triangle[5], p.ty);
     const floatn cx = across(triangle[6], triangle[8], p.tx), cy = across(triangle[7], triangle[8], p.ty);
