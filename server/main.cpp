@@ -1,10 +1,12 @@
 // penumbra-server: the HTTP service. Exit codes: 0 ended as asked, 1 it could not work, 2 wrong usage.
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,6 +14,8 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
+#include "descriptors.hpp"
+#include "notify.hpp"
 #include "opencl/quirks.hpp"
 #include "options.hpp"
 #include "service.hpp"
@@ -40,7 +44,23 @@ bool wait_for_signal(const sigset_t& signals, const timespec* time)
     }
 }
 
-int serve(const Options& options)
+// Tells the supervisor; that it cannot be told is worth a line, not the service.
+void tell(const Notifier& notifier, const std::string& state)
+{
+    if (const std::string wrong = notifier.tell(state); !wrong.empty()) say("warning: " + wrong);
+}
+
+// What goes before the first request. Gives the port.
+int begin(const Options& options, Service& service)
+{
+    const int port = service.bind();
+    say("penumbra-server " + version() + "\n" + startup_text(options) + "listening on " + options.host + " port " + std::to_string(port));
+    if (!is_loopback(options.host) && options.token.empty())
+        say("warning: everybody who reaches " + options.host + " can use this service; set a token, or put it behind a proxy");
+    return port;
+}
+
+int serve(const Options& options, const Environment& environment)
 {
     // Blocked before any thread is made, so that all of them inherit it.
     sigset_t signals;
@@ -49,21 +69,27 @@ int serve(const Options& options)
     sigaddset(&signals, SIGINT);
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
+    if (const std::string unknown = ensure_descriptors(); !unknown.empty()) say("warning: " + unknown);
+    const Notifier notifier(environment);
     opencl::prepare_environment();
     Service service(options, options.device.empty() ? Engine() : Engine(options.device), say);
-    const int port = service.bind();
-    say("penumbra-server " + version() + "\n" + startup_text(options) + "listening on " + options.host + " port " + std::to_string(port));
-    if (!is_loopback(options.host) && options.token.empty())
-        say("warning: everybody who reaches " + options.host + " can use this service; set a token, or put it behind a proxy");
+    const int port = begin(options, service);
+    tell(notifier, "STATUS=building kernels and checking the device");
 
     // A failure to get ready ends the service as a signal does, with another exit code.
     std::exception_ptr failure;
+    std::atomic<bool> failed = false;
+    std::optional<Watchdog> watchdog;
     std::jthread getting_ready([&] {
         try {
             service.become_ready();
             say("ready");
+            tell(notifier, "READY=1\nSTATUS=ready on " + options.host + " port " + std::to_string(port));
+            watchdog.emplace(
+                notifier, [&](auto within) { return answers_health(options.host, port, within); }, say);
         } catch (...) {
             failure = std::current_exception();
+            failed = true;
             kill(getpid(), SIGTERM);
         }
     });
@@ -71,12 +97,14 @@ int serve(const Options& options)
 
     wait_for_signal(signals, nullptr);
     say("ending: work in flight is being finished");
+    tell(notifier, failed ? "STOPPING=1\nSTATUS=could not get ready" : "STOPPING=1\nSTATUS=finishing work in flight");
     service.drain();
     if (options.drain_s > 0) {
         const timespec time{options.drain_s, 0};
         wait_for_signal(signals, &time); // a second signal shortens it
     }
     getting_ready.join();
+    watchdog.reset(); // from here on nobody is answered
     service.stop();
     answering.join();
     if (failure) std::rethrow_exception(failure);
@@ -96,7 +124,8 @@ int run(const std::vector<std::string>& arguments)
             throw Error(ErrorCode::output, "standard output cannot be written");
         return 0;
     }
-    return serve(options_from(arguments, [](const char* name) -> const char* { return std::getenv(name); }));
+    const Environment environment = [](const char* name) -> const char* { return std::getenv(name); };
+    return serve(options_from(arguments, environment), environment);
 }
 
 } // namespace
