@@ -63,13 +63,7 @@ public:
     Builder(const Topology& topology, const LightFrame& light, const LightPart& part) : any_plane_(light.shape == LightShape::disc)
     {
         points_.reserve(topology.vertices().size());
-        for (const Imath::V3f& vertex : topology.vertices()) {
-            const Vec3 from = Vec3(vertex) - part.centre;
-            // Rounded once, here: triangles and edges then meet to the bit.
-            const auto rounded = [](double value) { return static_cast<double>(static_cast<float>(value)); };
-            points_.emplace_back(rounded(from.dot(light.u) / part.half.x), rounded(from.dot(light.v) / part.half.y),
-                                 rounded(from.dot(light.direction) / part.half.z));
-        }
+        for (const Imath::V3f& vertex : topology.vertices()) points_.push_back(point_in_part(light, part, Vec3(vertex)));
     }
 
     void begin_sheet()
@@ -89,14 +83,14 @@ public:
         sheet_boxes_.push_back(sheet_box_);
     }
 
-    void add_edges(std::span<const SilhouetteEdge> edges)
+    void add_edges(std::span<const SilhouetteEdge> all, std::span<const std::uint32_t> numbers)
     {
-        std::vector<SilhouetteEdge> counted;
-        for (const SilhouetteEdge& edge : edges)
-            if (counts(edge.from) || counts(edge.to)) counted.push_back(edge);
+        std::vector<std::uint32_t> counted;
+        for (const std::uint32_t i : numbers)
+            if (counts(all[i].from) || counts(all[i].to)) counted.push_back(i);
         data_.edge_count += counted.size();
         for (std::size_t first = 0; first < counted.size(); first += group_size)
-            add_edge_group(std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
+            add_edge_group(all, std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
     }
 
     void add_triangles(std::span<const std::array<std::uint32_t, 3>> triangles)
@@ -151,15 +145,18 @@ private:
         triangles = std::move(sorted);
     }
 
-    void add_edge_group(std::span<const SilhouetteEdge> edges)
+    void add_edge_group(std::span<const SilhouetteEdge> all, std::span<const std::uint32_t> numbers)
     {
         const std::size_t ends = data_.edge_ends.size(), rows = data_.edges.size();
         data_.edge_ends.resize(ends + 6 * group_size, -1.0F); // 1 / z of -1 meets nothing
         data_.edges.resize(rows + 8 * group_size, 0.0F);
+        data_.edge_sources.insert(data_.edge_sources.end(), numbers.begin(), numbers.end());
+        data_.edge_sources.resize(data_.edges.size() / 8, no_edge);
         Box box;
-        for (std::size_t i = 0; i < edges.size(); ++i) {
-            const bool forward = edges[i].from < edges[i].to;
-            const Vec3 &a = points_[forward ? edges[i].from : edges[i].to], &b = points_[forward ? edges[i].to : edges[i].from];
+        for (std::size_t i = 0; i < numbers.size(); ++i) {
+            const SilhouetteEdge& edge = all[numbers[i]];
+            const bool forward = edge.from < edge.to;
+            const Vec3 &a = points_[forward ? edge.from : edge.to], &b = points_[forward ? edge.to : edge.from];
             float* const row = data_.edges.data() + rows + 8 * i;
             const std::array<double, 7> values{a.x, a.y, a.z, b.x, b.y, b.z, forward ? 1.0 : -1.0};
             std::transform(values.begin(), values.end(), row, [](double value) { return static_cast<float>(value); });
@@ -243,6 +240,15 @@ private:
 
 } // namespace
 
+Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& point)
+{
+    const Vec3 from = point - part.centre;
+    // Rounded once, here: triangles and edges then meet to the bit.
+    const auto rounded = [](double value) { return static_cast<double>(static_cast<float>(value)); };
+    return {rounded(from.dot(light.u) / part.half.x), rounded(from.dot(light.v) / part.half.y),
+            rounded(from.dot(light.direction) / part.half.z)};
+}
+
 std::vector<LightPart> parts_of(const LightFrame& light, int splits)
 {
     const double longer = std::max(light.half_u, light.half_v);
@@ -272,9 +278,9 @@ WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, con
                      bool edges_too)
 {
     // Edges of each sheet, loop after loop.
-    std::vector<std::vector<SilhouetteEdge>> edges(apart ? silhouette.sheets() : 1);
+    std::vector<std::vector<std::uint32_t>> edges(apart ? silhouette.sheets() : 1);
     if (edges_too)
-        for (const SilhouetteEdge& edge : silhouette.edges) edges[apart ? edge.sheet : 0].push_back(edge);
+        for (std::uint32_t i = 0; i < silhouette.edges.size(); ++i) edges[apart ? silhouette.edges[i].sheet : 0].push_back(i);
 
     Builder builder(topology, light, part);
     const std::span facing(silhouette.facing);
@@ -283,7 +289,7 @@ WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, con
         const std::size_t first = apart ? silhouette.facing_begin[sheet] : 0,
                           last = apart ? silhouette.facing_begin[sheet + 1] : facing.size();
         builder.add_triangles(facing.subspan(first, last - first));
-        builder.add_edges(edges[sheet]);
+        builder.add_edges(silhouette.edges, edges[sheet]);
         builder.end_sheet();
     }
     return builder.take();

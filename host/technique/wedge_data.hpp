@@ -22,11 +22,17 @@ struct LightPart {
 // is then tested against.
 std::vector<LightPart> parts_of(const LightFrame& light, int splits);
 
+// A point of the world in the part's light space, in `half`, as the device has it: rounded to binary32.
+Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& point);
+
+constexpr std::uint32_t no_edge = 0xffffffff;
+
 struct WedgeData {
     std::vector<Sheet> sheets;
     std::vector<float> sheet_boxes, edge_boxes, triangle_boxes; // blocks of 16 boxes, 5 x 16 floats each
     std::vector<float> edge_ends;                               // 6 x 16 floats a group
     std::vector<float> edges;                                   // 8 floats an edge
+    std::vector<std::uint32_t> edge_sources;                    // of each row of `edges`, its number in the silhouette; no_edge: padding
     std::vector<float> triangle_extents;                        // 5 x 16 floats a group
     std::vector<float> triangles;                               // 16 floats a triangle
     std::uint64_t edge_count = 0, triangle_count = 0;           // before padding
