@@ -1,0 +1,163 @@
+// Runs soft_shadow_volume step by step on the device and reads back all that it saw, for comparison with the oracle; casters by hand.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "oracle/soft_shadow_volume_oracle.hpp"
+#include "support/device_run.hpp"
+#include "support/maps.hpp"
+#include "technique/soft_shadow_volume.hpp"
+
+namespace penumbra::test {
+
+// Lights as in maps.hpp: at the origin, along -Z. Light space is (x, y, -z) of the world.
+inline Vec3 world_of(double x, double y, double z) { return {x, y, -z}; }
+inline SphereLight sphere_light(double radius)
+{
+    return {.center = {0, 0, 0}, .radius = radius, .direction = {0, 0, -1}, .up = Vec3(0, 1, 0)};
+}
+
+inline TriangleMesh mesh_of(const std::vector<Vec3>& points, const std::vector<std::array<std::uint32_t, 3>>& triangles)
+{
+    TriangleMesh mesh;
+    for (const Vec3& p : points) mesh.positions.emplace_back(world_of(p.x, p.y, p.z));
+    mesh.triangles = triangles;
+    return mesh;
+}
+
+// Rectangles by light-space coordinates: parallel to the light, and with four corners of their own.
+inline TriangleMesh sheet(double x0, double x1, double y0, double y1, double z)
+{
+    return mesh_of({{x0, y0, z}, {x1, y0, z}, {x1, y1, z}, {x0, y1, z}}, {{0, 1, 2}, {0, 2, 3}});
+}
+inline TriangleMesh sheet(const std::array<Vec3, 4>& c) { return mesh_of({c[0], c[1], c[2], c[3]}, {{0, 1, 2}, {0, 2, 3}}); }
+
+inline TriangleMesh closed_box(const Vec3& low, const Vec3& high)
+{
+    std::vector<Vec3> points;
+    for (int i = 0; i < 8; ++i)
+        points.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z);
+    return mesh_of(points, {{0, 2, 3},
+                            {0, 3, 1},
+                            {4, 5, 7},
+                            {4, 7, 6},
+                            {0, 1, 5},
+                            {0, 5, 4},
+                            {2, 6, 7},
+                            {2, 7, 3},
+                            {0, 4, 6},
+                            {0, 6, 2},
+                            {1, 3, 7},
+                            {1, 7, 5}});
+}
+
+// Triangles anywhere in the box, each a mesh of its own.
+inline std::vector<TriangleMesh> soup(int count, const Vec3& low, const Vec3& high, std::uint32_t seed)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> any(0, 1);
+    const auto point = [&] {
+        const double x = any(random), y = any(random), z = any(random);
+        return low + Vec3(x, y, z) * (high - low);
+    };
+    std::vector<TriangleMesh> meshes;
+    for (int i = 0; i < count; ++i) {
+        const Vec3 a = point(), b = point(), c = point();
+        meshes.push_back(mesh_of({a, b, c}, {{0, 1, 2}}));
+    }
+    return meshes;
+}
+
+struct WedgeCase {
+    Light light = rectangle_light(1, 1);
+    std::vector<TriangleMesh> casters = {};
+    SoftShadowVolume settings = {};
+    DepthMap receivers = {};
+    std::optional<Camera> camera = {}; // of the receivers; nothing: at the light, tangents of 1
+};
+
+struct WedgeRun {
+    std::vector<oracle::Receiver> points; // tangents and disparity; d = NO_RECEIVER where there is none
+    std::vector<float> visibility;
+    ShadeCounts counts;
+};
+
+inline Topology topology_of(const std::vector<TriangleMesh>& meshes)
+{
+    std::vector<const TriangleMesh*> pointers;
+    for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
+    return Topology(pointers);
+}
+
+inline WedgeRun run(const std::shared_ptr<opencl::Context>& context, const WedgeCase& c)
+{
+    opencl::Work work(context);
+    const Topology topology = topology_of(c.casters);
+    const PreparedSoftShadowVolume prepared = prepare_soft_shadow_volume(work, c.light, {.topology = topology}, c.settings);
+    const auto depth = work.upload(std::span<const float>(c.receivers.depth), "receivers");
+    const Camera view = wedge_view(c.light);
+    const ReceiverPoints points = receiver_points(work, receiver_view(c.camera.value_or(view), c.receivers.width, c.receivers.height, view),
+                                                  depth.memory(), c.receivers.precision, prepared.program);
+    const auto visibility = work.buffer<float>(c.receivers.depth.size(), "visibility");
+    WedgeRun result;
+    shade_soft_shadow_volume(work, prepared, points, visibility.memory(), &result.counts);
+    result.points = read_points(work, points);
+    result.visibility = work.read(visibility);
+    work.finish();
+    return result;
+}
+
+// What the oracle says, for every receiver.
+class WedgeExpectation {
+public:
+    explicit WedgeExpectation(const WedgeCase& c) : settings_(c.settings)
+    {
+        const LightFrame frame = light_frame(c.light);
+        shape_ = frame.shape == LightShape::disc ? oracle::wedge::Shape::disc : oracle::wedge::Shape::square;
+        origin_ = frame.origin;
+        const Topology topology = topology_of(c.casters);
+        for (const LightPart& part : parts_of(frame, c.settings.light_splits)) {
+            const Silhouette silhouette = silhouette_of(topology, part.centre);
+            Part own{.part = part, .sheets = std::vector<std::vector<oracle::wedge::Triangle>>(silhouette.sheets())};
+            for (std::size_t s = 0; s < silhouette.sheets(); ++s)
+                for (std::size_t i = silhouette.facing_begin[s]; i < silhouette.facing_begin[s + 1]; ++i) {
+                    oracle::wedge::Triangle triangle;
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        const Vec3 from = Vec3(topology.vertices()[silhouette.facing[i][k]]) - part.centre;
+                        triangle[k] = Vec3(from.dot(frame.u), from.dot(frame.v), from.dot(frame.direction)) / part.half;
+                    }
+                    own.sheets[s].push_back(triangle);
+                }
+            parts_.push_back(std::move(own));
+        }
+    }
+
+    oracle::wedge::Bounded at(const oracle::Receiver& p) const
+    {
+        oracle::wedge::Bounded seen{1, 0x1p-24};
+        for (const Part& part : parts_) {
+            const Vec3 place = Vec3(p.xi / p.d, p.eta / p.d, 1 / p.d) / part.part.half - Vec3(part.part.centre_x, part.part.centre_y, 0);
+            const auto one = oracle::wedge::occlusion(shape_, {place}, part.sheets, static_cast<oracle::wedge::Joined>(settings_.overlap));
+            seen.value -= part.part.share * one.value;
+            seen.bound += part.part.share * one.bound;
+        }
+        return seen;
+    }
+
+    void forget_a_triangle() { parts_.front().sheets.front().pop_back(); }
+
+private:
+    struct Part {
+        LightPart part;
+        std::vector<std::vector<oracle::wedge::Triangle>> sheets;
+    };
+    SoftShadowVolume settings_;
+    oracle::wedge::Shape shape_;
+    Vec3 origin_;
+    std::vector<Part> parts_;
+};
+
+} // namespace penumbra::test
