@@ -19,16 +19,15 @@ thread_local Connection* served = nullptr;
 
 constexpr std::size_t read_bytes = 65536; // at a time
 
-// Waits until the socket can be read; false when the time is up.
-bool wait_for_bytes(socket_t socket, Deadline::Clock::time_point end)
+// Waits until the socket can be read, or the time is up.
+void wait_for_bytes(socket_t socket, Deadline::Clock::time_point end)
 {
     for (;;) {
         const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Deadline::Clock::now()).count();
-        if (left <= 0) return false;
+        if (left <= 0) return;
         pollfd entry{socket, POLLIN, 0};
         const int ready = ::poll(&entry, 1, static_cast<int>(std::min<long>(left, 1 << 30)));
-        if (ready > 0) return true;
-        if (ready < 0 && errno != EINTR) return false;
+        if (ready >= 0 || errno != EINTR) return;
     }
 }
 
@@ -74,43 +73,78 @@ Connection::~Connection()
 
 Connection& Connection::current() { return *served; }
 
+bool Connection::late()
+{
+    // A drip-feeding client has bytes every time one looks: the deadlines count, not the pause.
+    const auto slow = transfer_end(body_begun_, body_bytes_);
+    if (Deadline::Clock::now() < std::min(slow, request_.end())) return false;
+    timed_out_ = true;
+    too_slow_ = slow < request_.end();
+    return true;
+}
+
+std::size_t Connection::receive(char* to, std::size_t size)
+{
+    for (;;) {
+        if (ended_ || late()) return 0;
+        const ssize_t got = ::recv(socket_, to, size, MSG_DONTWAIT);
+        if (got > 0) return static_cast<std::size_t>(got);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
+            wait_for_bytes(socket_, std::min(transfer_end(body_begun_, body_bytes_), request_.end()));
+        else
+            ended_ = true;
+    }
+}
+
 bool Connection::fill()
 {
     from_ = 0;
     buffer_.clear();
     // The headers are all here: what is missing of them does not come.
     if (ended_ || !in_body_) return false;
-    const auto slow = transfer_end(body_begun_, body_bytes_);
-    if (!wait_for_bytes(socket_, std::min(slow, request_.end()))) {
-        timed_out_ = true;
-        too_slow_ = slow < request_.end();
-        return false;
-    }
     buffer_.resize(read_bytes);
-    const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
-    ended_ = got <= 0;
-    buffer_.resize(got <= 0 ? 0 : static_cast<std::size_t>(got));
-    return !ended_;
+    buffer_.resize(receive(buffer_.data(), buffer_.size()));
+    return !buffer_.empty();
 }
 
 ssize_t Connection::read(char* to, size_t size)
 {
     if (from_ == buffer_.size() && !fill()) return ended_ ? 0 : -1;
-    // A drip-feeding client makes poll succeed every time: the deadline counts, not the pause.
-    if (in_body_ && request_.passed()) {
-        timed_out_ = true;
+    if (in_body_ && late()) return -1;
+    const std::size_t count = take_buffered(to, size);
+    if (in_body_)
+        count_body(count);
+    else if ((header_bytes_ += count) > max_header_bytes)
         return -1;
+    return static_cast<ssize_t>(count);
+}
+
+std::size_t Connection::read_body(char* to, std::size_t size)
+{
+    std::size_t done = take_buffered(to, size);
+    count_body(done);
+    while (done < size) {
+        const std::size_t got = receive(to + done, size - done);
+        if (got == 0) break;
+        count_body(got);
+        done += got;
     }
+    return done;
+}
+
+std::size_t Connection::take_buffered(char* to, std::size_t size)
+{
     const std::size_t count = std::min(size, buffer_.size() - from_);
-    if (in_body_) {
-        body_left_ -= std::min<std::uint64_t>(body_left_, count);
-        body_bytes_ += count;
-    } else if ((header_bytes_ += count) > max_header_bytes) {
-        return -1;
-    }
     std::memcpy(to, buffer_.data() + from_, count);
     from_ += count;
-    return static_cast<ssize_t>(count);
+    return count;
+}
+
+void Connection::count_body(std::size_t count)
+{
+    body_left_ -= std::min<std::uint64_t>(body_left_, count);
+    body_bytes_ += count;
 }
 
 ssize_t Connection::write(const char* from, size_t size)

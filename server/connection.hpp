@@ -8,8 +8,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <httplib.h>
 
@@ -24,6 +26,19 @@ struct RequestCost {
     std::string technique;
     std::uint64_t bytes_in = 0;
     double upload_ms = 0, queue_ms = 0, decode_ms = 0, compute_ms = 0, encode_ms = 0;
+};
+
+// A request's body. Memory that no byte has come for is not touched.
+class Body {
+public:
+    explicit Body(std::size_t size) : bytes_(std::make_unique_for_overwrite<char[]>(size)), size_(size) {}
+    char* data() { return bytes_.get(); }
+    std::size_t size() const { return size_; }
+    operator std::string_view() const { return {bytes_.get(), size_}; }
+
+private:
+    std::unique_ptr<char[]> bytes_;
+    std::size_t size_;
 };
 
 class Connection final : public httplib::Stream {
@@ -48,6 +63,8 @@ public:
     // From now on bytes belong to the body, of which `expected` are to come.
     void begin_body(std::uint64_t expected);
     bool in_body() const { return in_body_; }
+    // Reads the next `size` bytes of the body straight to where they are wanted; gives how many came before it ended, or timed out.
+    std::size_t read_body(char* to, std::size_t size);
 
     const Deadline& request() const { return request_; }
     bool timed_out() const { return timed_out_; }
@@ -62,7 +79,11 @@ public:
     Deadline::Clock::time_point begun;
 
 private:
-    bool fill(); // the buffer with more of the body; false: nothing came
+    bool late();                                     // whether the body's time is up; notes it
+    std::size_t receive(char* to, std::size_t size); // waits for more of the body; 0: nothing came
+    bool fill();                                     // the buffer with more of the body; false: nothing came
+    std::size_t take_buffered(char* to, std::size_t size);
+    void count_body(std::size_t count);
 
     Lobby& lobby_;
     socket_t socket_;

@@ -26,6 +26,7 @@ class ContentReader;
 namespace penumbra::server {
 
 struct Route;
+class Body;
 
 class Service {
 public:
@@ -59,7 +60,7 @@ private:
     void check_body_headers(const Request& request, const Route& route) const;
 
     // service_masks.cpp: what computes.
-    std::string read_body(const Request& request, const Reader& reader) const;
+    Body read_body(const Request& request) const;
     void post_mask(const Request& request, Response& response, const Reader& reader);
     void post_scene(const Request& request, Response& response, const Reader& reader);
     void post_kept_mask(const Request& request, Response& response, const Reader& reader);

@@ -1,5 +1,6 @@
 // The calls that compute: masks of scenes that come along, and of scenes that are kept.
 #include <algorithm>
+#include <future>
 #include <optional>
 
 #include <nlohmann/json.hpp>
@@ -25,40 +26,52 @@ std::string_view id_in(const httplib::Request& request)
     return std::string_view(request.path).substr(before, 64);
 }
 
-// Whether the client has that mask already; then the answer is 304.
-bool has_it(const httplib::Request& request, httplib::Response& response, const std::string& tag)
-{
-    response.set_header("ETag", tag);
-    response.set_header("Cache-Control", "private, no-cache");
-    if (!names_tag(request.get_header_value("If-None-Match"), tag)) return false;
-    response.status = 304;
-    return true;
-}
+// The entity tag of a mask, made beside what else is to be done: SHA-256 takes a millisecond or more for the two megabytes of a pair of
+// maps. Waits for its end when it goes.
+class Tag {
+public:
+    // `make` gives the tag; what it refers to outlives this. Few bytes are done sooner than a thread has started (some 50 us).
+    template <class Make> Tag(std::size_t bytes, Make make)
+        : tag_(std::async(bytes < 65536 ? std::launch::deferred : std::launch::async | std::launch::deferred, std::move(make)))
+    {
+    }
+
+    // Whether the client has that mask already; then the answer is 304.
+    bool is_known(const httplib::Request& request, httplib::Response& response) const
+    {
+        if (!request.has_header("If-None-Match") || !names_tag(request.get_header_value("If-None-Match"), tag_.get())) return false;
+        set_on(response);
+        response.status = 304;
+        return true;
+    }
+    void set_on(httplib::Response& response) const
+    {
+        response.set_header("ETag", tag_.get());
+        response.set_header("Cache-Control", "private, no-cache");
+    }
+
+private:
+    std::shared_future<std::string> tag_;
+};
 
 } // namespace
 
-// The body, whole, never more than announced and allowed. What is reserved costs nothing before it is written to.
-std::string Service::read_body(const Request& request, const Reader& reader) const
+// The body, whole, as long as announced. It goes past the HTTP library's reader, which copies it twice.
+Body Service::read_body(const Request& request) const
 {
     Connection& connection = Connection::current();
     const auto uploading = Deadline::Clock::now();
-    std::string body;
     const std::size_t length = static_cast<std::size_t>(length_from(request.get_header_value("Content-Length")).value_or(0));
-    body.reserve(length);
-    const bool whole = length == 0 || reader([&](const char* data, std::size_t size) {
-                           if (size > length - body.size()) return false;
-                           body.append(data, size);
-                           return true;
-                       });
+    Body body(length);
+    const std::size_t came = connection.read_body(body.data(), length);
     if (connection.too_slow())
         throw Problem(408, "slow_body",
                       "the body came at less than " + std::to_string(slowest_transfer) + " bytes a second, " +
                           std::to_string(transfer_grace.count()) + " s after its begin");
     if (connection.timed_out())
         throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
-    if (!whole || body.size() != length)
-        throw Problem(400, "short_body",
-                      "the body ended after " + std::to_string(body.size()) + " of " + std::to_string(length) + " bytes");
+    if (came != length)
+        throw Problem(400, "short_body", "the body ended after " + std::to_string(came) + " of " + std::to_string(length) + " bytes");
     const double upload_s = seconds_since(uploading);
     connection.cost.bytes_in = length;
     connection.cost.upload_ms = upload_s * 1000;
@@ -76,27 +89,29 @@ Gate::Guard Service::enter_slot()
     return slot;
 }
 
-void Service::post_mask(const Request& request, Response& response, const Reader& reader)
+void Service::post_mask(const Request& request, Response& response, const Reader&)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const MaskFormat& format = negotiate(request.get_header_value("Accept"));
-    const std::string body = read_body(request, reader);
+    const Body body = read_body(request);
     const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
-    if (has_it(request, response, etag_of(engine_, id_of(parts), format))) return;
+    const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), format); });
+    if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
     const auto decoding = Deadline::Clock::now();
     const MaskTask task = task_of(parts, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;
     send_mask(response, task, format);
+    tag.set_on(response);
 }
 
-void Service::post_scene(const Request& request, Response& response, const Reader& reader)
+void Service::post_scene(const Request& request, Response& response, const Reader&)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
-    const std::string body = read_body(request, reader);
+    const Body body = read_body(request);
     const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
     if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
     const std::string id = id_of(parts);
@@ -116,28 +131,30 @@ void Service::post_scene(const Request& request, Response& response, const Reade
     response.set_content(describe(*scene), "application/json");
 }
 
-void Service::post_kept_mask(const Request& request, Response& response, const Reader& reader)
+void Service::post_kept_mask(const Request& request, Response& response, const Reader&)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const auto scene = scenes_.find(id_in(request), true);
     if (!scene) throw no_scene();
     const MaskFormat& format = negotiate(request.get_header_value("Accept"));
-    const std::string body = read_body(request, reader);
+    const Body body = read_body(request);
     std::vector<Part> parts;
     std::string_view patch = body;
-    if (!body.empty() && !is_json(connection.content_type)) {
+    if (body.size() > 0 && !is_json(connection.content_type)) {
         parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
         const Part* const part = find_scene(parts, options_);
         patch = part ? part->bytes : std::string_view();
     }
-    if (has_it(request, response, etag_of(engine_, scene->content_of(patch, parts), format))) return;
+    const Tag tag(body.size(), [&] { return etag_of(engine_, scene->content_of(patch, parts), format); });
+    if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
     const auto decoding = Deadline::Clock::now();
     const MaskTask task = scene->task(patch, parts, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;
     send_mask(response, task, format);
+    tag.set_on(response);
     scenes_.tidy();
 }
 
