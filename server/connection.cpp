@@ -76,7 +76,7 @@ Connection& Connection::current() { return *served; }
 bool Connection::late()
 {
     // A drip-feeding client has bytes every time one looks: the deadlines count, not the pause.
-    const auto slow = transfer_end(body_begun_, body_bytes_);
+    const auto slow = lobby_.limits().transfer_end(body_begun_, body_bytes_);
     if (Deadline::Clock::now() < std::min(slow, request_.end())) return false;
     timed_out_ = true;
     too_slow_ = slow < request_.end();
@@ -91,7 +91,7 @@ std::size_t Connection::receive(char* to, std::size_t size)
         if (got > 0) return static_cast<std::size_t>(got);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
-            wait_for_bytes(socket_, std::min(transfer_end(body_begun_, body_bytes_), request_.end()));
+            wait_for_bytes(socket_, std::min(lobby_.limits().transfer_end(body_begun_, body_bytes_), request_.end()));
         else
             ended_ = true;
     }
@@ -115,7 +115,7 @@ ssize_t Connection::read(char* to, size_t size)
     const std::size_t count = take_buffered(to, size);
     if (in_body_)
         count_body(count);
-    else if ((header_bytes_ += count) > max_header_bytes)
+    else if ((header_bytes_ += count) > lobby_.limits().header_bytes)
         return -1;
     return static_cast<ssize_t>(count);
 }

@@ -69,7 +69,7 @@ public:
     const Deadline& request() const { return request_; }
     bool timed_out() const { return timed_out_; }
     bool too_slow() const { return too_slow_; } // timed out before the request's deadline: see transfer_end()
-    bool headers_too_large() const { return line_too_long_ || header_bytes_ > max_header_bytes; }
+    bool headers_too_large() const { return line_too_long_ || header_bytes_ > lobby_.limits().header_bytes; }
 
     // Of the request, for its handler and its log line. `reason` and `inside`: why it was refused, for metrics and for the log alone.
     std::string content_type, request_id, reason, inside;

@@ -18,9 +18,6 @@ namespace {
 constexpr std::chrono::seconds forget_time{2};
 constexpr std::size_t forget_bytes = std::size_t{4} << 20;
 
-// Answers that wait for their clients, together. Above it the one that waits longest is given up.
-constexpr std::uint64_t max_waiting_bytes = std::uint64_t{256} << 20;
-
 // How long headers may take when somebody else needs the place.
 constexpr std::chrono::seconds patience{1};
 
@@ -34,13 +31,12 @@ bool has_headers(const std::string& bytes, std::size_t searched)
 
 } // namespace
 
-std::chrono::steady_clock::time_point transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes)
+std::chrono::steady_clock::time_point LobbyLimits::transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes) const
 {
     return begin + transfer_grace + std::chrono::milliseconds(bytes * 1000 / slowest_transfer);
 }
 
-Lobby::Lobby(std::size_t connections, Clock::duration header_time, Serve serve)
-    : places_(connections), header_time_(header_time), serve_(std::move(serve)), events_(epoll_create1(EPOLL_CLOEXEC))
+Lobby::Lobby(const LobbyLimits& limits, Serve serve) : limits_(limits), serve_(std::move(serve)), events_(epoll_create1(EPOLL_CLOEXEC))
 {
     if (events_ < 0) throw Error(ErrorCode::internal, "no epoll descriptor", "expected fewer open files");
     thread_ = std::thread([this] { run(); });
@@ -60,7 +56,7 @@ Lobby::~Lobby()
 void Lobby::arrive(int socket)
 {
     std::unique_lock lock(mutex_);
-    while (guests_.size() + served_ >= places_ && !make_room()) {
+    while (guests_.size() + served_ >= limits_.connections && !make_room()) {
         lock.unlock();
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
         lock.lock();
@@ -158,7 +154,7 @@ void Lobby::read_headers(Guests::iterator guest)
     std::string& bytes = guest->second.bytes;
     const std::size_t searched = bytes.size();
     bytes.append(buffer.data(), static_cast<std::size_t>(got));
-    if (bytes.size() > max_header_bytes || has_headers(bytes, searched)) hand_over(guest, false, false);
+    if (bytes.size() > limits_.header_bytes || has_headers(bytes, searched)) hand_over(guest, false, false);
 }
 
 void Lobby::send(Guests::iterator entry)
@@ -208,8 +204,8 @@ void Lobby::end_late(Clock::time_point now)
 {
     std::vector<int> late;
     for (const auto& [socket, guest] : guests_) {
-        const bool over = guest.phase == Phase::headers   ? now - guest.phase_begun >= header_time_
-                          : guest.phase == Phase::sending ? now >= transfer_end(guest.phase_begun, guest.done)
+        const bool over = guest.phase == Phase::headers   ? now - guest.phase_begun >= limits_.header_time
+                          : guest.phase == Phase::sending ? now >= limits_.transfer_end(guest.phase_begun, guest.done)
                                                           : now - guest.phase_begun >= forget_time;
         if (over) late.push_back(socket);
     }
@@ -220,7 +216,7 @@ void Lobby::end_late(Clock::time_point now)
         else
             close(guest);
     }
-    while (waiting_bytes_ > max_waiting_bytes) give_up_an_answer();
+    while (waiting_bytes_ > limits_.answer_bytes) give_up_an_answer();
 }
 
 bool Lobby::make_room()

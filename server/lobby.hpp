@@ -16,15 +16,19 @@
 
 namespace penumbra::server {
 
-constexpr std::size_t max_header_bytes = 16384; // request line and headers together
+struct LobbyLimits {
+    std::size_t connections = 512; // open at a time
+    std::chrono::steady_clock::duration header_time = std::chrono::seconds(5);
+    std::size_t header_bytes = 16384; // request line and headers together
+    std::uint64_t answer_bytes = std::uint64_t{256}
+                                 << 20; // of all answers that wait for their clients; beyond, the one that waits longest is given up
+    // The slowest transfer that is waited for: after `transfer_grace` a body, or an answer, has to have moved on at this on average.
+    std::uint64_t slowest_transfer = 16384; // bytes a second
 
-// The slowest transfer that is waited for: after `transfer_grace` a body, or an answer, has to have moved on at `slowest_transfer` on
-// average.
+    // When a transfer that began at `begin` and has moved `bytes` is too slow.
+    std::chrono::steady_clock::time_point transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes) const;
+};
 constexpr std::chrono::seconds transfer_grace{5};
-constexpr std::uint64_t slowest_transfer = 16384; // bytes a second
-
-// When a transfer that began at `begin` and has moved `bytes` is too slow.
-std::chrono::steady_clock::time_point transfer_end(std::chrono::steady_clock::time_point begin, std::uint64_t bytes);
 
 // A connection whose headers are here, or will never be.
 struct Arrival {
@@ -41,9 +45,9 @@ public:
     // `serve` gets each socket with its bytes, from the lobby's thread; it must neither block nor call the lobby.
     using Serve = std::function<void(Arrival)>;
 
-    // No more than `connections` are open at a time, those that are served included. One more pushes out the oldest that has waited for its
-    // headers for a second, or that is being forgotten; when there is none, it waits where the kernel keeps it.
-    Lobby(std::size_t connections, Clock::duration header_time, Serve serve);
+    // No more than limits.connections are open at a time, those that are served included. One more pushes out the oldest that has waited
+    // for its headers for a second, or that is being forgotten; when there is none, it waits where the kernel keeps it.
+    Lobby(const LobbyLimits& limits, Serve serve);
     ~Lobby();
     Lobby(const Lobby&) = delete;
     Lobby& operator=(const Lobby&) = delete;
@@ -59,6 +63,7 @@ public:
     void wait_for_leaving();
 
     std::size_t connections() const; // those that are open
+    const LobbyLimits& limits() const { return limits_; }
 
 private:
     enum class Phase { headers, sending, forgetting };
@@ -85,8 +90,7 @@ private:
     void watch(int socket, Phase phase, bool already);
     bool any(Phase phase) const;
 
-    const std::size_t places_;
-    const Clock::duration header_time_;
+    const LobbyLimits limits_;
     const Serve serve_;
     const int events_;
     mutable std::mutex mutex_;

@@ -15,7 +15,8 @@ struct Name {
 };
 constexpr std::array names{
     Name{"http_requests_total", "counter", "Requests answered, by route and status."},
-    Name{"http_request_duration_seconds", "histogram", "From connection to the last byte handed to the kernel, by route."},
+    Name{"http_request_duration_seconds", "histogram",
+         "From connection to the answer handed over, by route; what a slow client takes after that is not in it."},
     Name{"penumbra_rejected_total", "counter", "Requests that got no mask, by reason."},
     Name{"penumbra_pixels_total", "counter", "Pixels of masks sent."},
     Name{"penumbra_upload_seconds", "histogram", "Reading the body."},

@@ -31,11 +31,15 @@ struct Options {
     std::int64_t rays = std::int64_t{1} << 26;
     std::int64_t deadline_s = 30;
     std::int64_t header_s = 5;
+    std::int64_t header_bytes = 16384;
+    std::int64_t transfer_bytes_s = 16384;
 
     // Limits of the service.
     std::int64_t slots = 2;
     std::int64_t queue = 16;
     std::int64_t io_threads = 32;
+    std::int64_t connections = 512;
+    std::int64_t answer_bytes = std::int64_t{256} << 20;
     std::int64_t drain_s = 0;
     std::int64_t scenes = 64;
     std::int64_t scenes_bytes = std::int64_t{1} << 30;

@@ -16,14 +16,22 @@
 namespace penumbra::server {
 namespace {
 
-constexpr int backlog = 1024;                // connections that the kernel keeps for us; the HTTP library asks for 5
-constexpr std::size_t max_connections = 512; // in the lobby; with threads and device files below the usual limit of 1024 descriptors
+constexpr int backlog = 1024; // connections that the kernel keeps for us; the HTTP library asks for 5
 
 bool is_request_id(std::string_view id)
 {
     return !id.empty() && id.size() <= 128 && std::ranges::all_of(id, [](char c) {
         return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' || c == '_' || c == '-';
     });
+}
+
+LobbyLimits limits_of(const Options& options)
+{
+    return {.connections = static_cast<std::size_t>(options.connections),
+            .header_time = std::chrono::seconds(options.header_s),
+            .header_bytes = static_cast<std::size_t>(options.header_bytes),
+            .answer_bytes = static_cast<std::uint64_t>(options.answer_bytes),
+            .slowest_transfer = static_cast<std::uint64_t>(options.transfer_bytes_s)};
 }
 
 std::string random_prefix()
@@ -41,7 +49,7 @@ class Service::Http::Reception final : public httplib::TaskQueue {
 public:
     explicit Reception(Http& http)
         : threads_(static_cast<std::size_t>(http.service_.options_.io_threads)),
-          lobby_(max_connections, std::chrono::seconds(http.service_.options_.header_s), [this, &http](Arrival arrival) {
+          lobby_(limits_of(http.service_.options_), [this, &http](Arrival arrival) {
               threads_.enqueue([this, &http, arrival = std::move(arrival)]() mutable { http.serve(lobby_, std::move(arrival)); });
           })
     {

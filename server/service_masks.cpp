@@ -66,7 +66,7 @@ Body Service::read_body(const Request& request) const
     const std::size_t came = connection.read_body(body.data(), length);
     if (connection.too_slow())
         throw Problem(408, "slow_body",
-                      "the body came at less than " + std::to_string(slowest_transfer) + " bytes a second, " +
+                      "the body came at less than " + std::to_string(options_.transfer_bytes_s) + " bytes a second, " +
                           std::to_string(transfer_grace.count()) + " s after its begin");
     if (connection.timed_out())
         throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");

@@ -17,13 +17,13 @@ constexpr const char* page_policy = "default-src 'none'; script-src 'self'; styl
                                     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 // Answers that the library gives by itself, before any of our handlers: they have no body yet.
-void answer_for_library(httplib::Response& response)
+void answer_for_library(httplib::Response& response, const Options& options)
 {
     if (!response.body.empty() || response.status < 400) return;
     const Connection& connection = Connection::current();
     if (connection.headers_too_large())
         answer(response, Problem(431, "header_bytes",
-                                 "request line and headers have more than " + std::to_string(max_header_bytes) + " bytes, the limit"));
+                                 "request line and headers have more than " + std::to_string(options.header_bytes) + " bytes, the limit"));
     else if (connection.timed_out())
         answer(response, Problem(408, "slow_headers", "the headers did not come in time"));
     else
@@ -52,7 +52,7 @@ void Service::set_routes()
         if (status == 100) response.status = -1;
         return status;
     });
-    http_->set_error_handler([](const Request&, Response& response) { answer_for_library(response); });
+    http_->set_error_handler([this](const Request&, Response& response) { answer_for_library(response, options_); });
     http_->set_exception_handler([](const Request&, Response& response, std::exception_ptr) { answer(response, defect()); });
     http_->set_logger([this](const Request& request, const Response& response) { finished(request, response); });
     http_->set_post_routing_handler([](const Request&, Response& response) {
@@ -60,6 +60,11 @@ void Service::set_routes()
         response.set_header("X-Content-Type-Options", "nosniff");
         response.set_header("X-Request-Id", connection.request_id);
         if (connection.trace) response.set_header("traceparent", traceparent_of(*connection.trace, connection.span_id));
+        // A tag names what was asked for, not an error.
+        if (response.status >= 400) {
+            response.headers.erase("ETag");
+            response.headers.erase("Cache-Control");
+        }
         if (!response.has_header("Cache-Control")) response.set_header("Cache-Control", "no-store");
     });
 

@@ -198,7 +198,7 @@ TEST(Lobby, AnswersArriveWholeWhenTheyAreTaken)
     std::string got;
     {
         std::vector<std::jthread> threads;
-        server::Lobby lobby(4, std::chrono::seconds(5), [&](server::Arrival arrival) {
+        server::Lobby lobby({.connections = 4}, [&](server::Arrival arrival) {
             threads.emplace_back([&lobby, socket = arrival.socket, fill = arrival.bytes.front()] {
                 lobby.leave(socket, std::string(std::size_t{8} << 20, fill), false);
             });
@@ -231,7 +231,7 @@ TEST(Lobby, AnswersThatNobodyTakesAreGivenUp)
     const auto begin = Clock::now();
     {
         std::jthread thread;
-        server::Lobby lobby(4, std::chrono::seconds(1), [&](server::Arrival arrival) {
+        server::Lobby lobby({.connections = 4, .header_time = std::chrono::seconds(1)}, [&](server::Arrival arrival) {
             thread =
                 std::jthread([&lobby, socket = arrival.socket] { lobby.leave(socket, std::string(std::size_t{8} << 20, 'x'), false); });
         });

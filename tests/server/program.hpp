@@ -16,6 +16,7 @@ namespace penumbra::test {
 struct Program {
     pid_t process = 0;
     int errors = -1;
+    mutable bool waited = false;
 
     explicit Program(const std::vector<std::string>& arguments)
     {
@@ -35,7 +36,14 @@ struct Program {
         ::close(ends[1]);
         errors = ends[0];
     }
-    ~Program() { ::close(errors); }
+    // A test that failed on the way leaves no process behind.
+    ~Program()
+    {
+        ::close(errors);
+        if (waited) return;
+        kill(process, SIGKILL);
+        wait();
+    }
     Program(const Program&) = delete;
     Program& operator=(const Program&) = delete;
 
@@ -58,6 +66,7 @@ struct Program {
     int wait() const
     {
         int status = 0;
+        waited = true;
         waitpid(process, &status, 0);
         return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     }

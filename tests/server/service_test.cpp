@@ -10,6 +10,7 @@
 #include "describe.hpp"
 #include "options.hpp"
 #include "problem.hpp"
+#include "program.hpp"
 #include "ready.hpp"
 #include "route.hpp"
 #include "technique/table.hpp"
@@ -81,46 +82,6 @@ TEST(Readiness, NotBeforeTheKnownMask)
     EXPECT_EQ(get(cold.port, "/readyz").status, 503);
     EXPECT_EQ(ask(cold.port, post(form(parts()))).status, 200); // until the socket closes
 }
-
-// The real program.
-struct Program {
-    pid_t process = 0;
-    int errors = -1;
-
-    explicit Program(const std::vector<std::string>& arguments)
-    {
-        std::array<int, 2> ends{};
-        if (pipe2(ends.data(), O_CLOEXEC) != 0) return;
-        std::vector<std::string> words{PENUMBRA_SERVER};
-        words.insert(words.end(), arguments.begin(), arguments.end());
-        std::vector<char*> pointers;
-        for (std::string& word : words) pointers.push_back(word.data());
-        pointers.push_back(nullptr);
-        process = fork();
-        if (process == 0) {
-            dup2(ends[1], 2);
-            execv(PENUMBRA_SERVER, pointers.data());
-            _exit(127);
-        }
-        ::close(ends[1]);
-        errors = ends[0];
-    }
-    ~Program() { ::close(errors); }
-    // What it says up to and with `end`, or all.
-    std::string said_until(const std::string& end) const
-    {
-        std::string text;
-        char c = 0;
-        while (!holds(text, end) && ::read(errors, &c, 1) == 1) text += c;
-        return text;
-    }
-    int wait() const
-    {
-        int status = 0;
-        waitpid(process, &status, 0);
-        return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    }
-};
 
 TEST(Program, FinishesWorkInFlightAfterSigterm)
 {
