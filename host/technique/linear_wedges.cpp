@@ -37,10 +37,11 @@ struct Space {
     Vec3 operator()(std::uint32_t vertex) const { return in_part(vertex) * radii; }
 };
 
-// A side plane through a wedge's end: normal . x = offset, both of any length.
+// A side plane through a wedge's end, normal . x = offset; neighbours have the same numbers.
 struct SidePlane {
     Vec3 normal{0, 0, 0};
     double offset = 0;
+    double scale = 0;          // makes normal . x - offset the distance along the edge, not negative inside
     double front_weight = 0.5; // t_b's in s of this side
 };
 
@@ -127,12 +128,11 @@ bool bounds(const Wedge& wedge, const Vec3& vertex, const Vec3& side, double mit
     return front.length() <= mitre && back.length() <= mitre && front.dot(wedge.normal) < 0 && back.dot(wedge.normal) > 0;
 }
 
-// The side plane, turned so that the wedge is on its positive side; `first`: at the wedge's first end.
+// `side` as the wedge's side plane at its first end or the other.
 SidePlane side_plane(const Wedge& wedge, const Vec3& vertex, const Vec3& side, bool through_centre, const Vec3& mean, bool first)
 {
     const double cuts = side.dot(wedge.along);
-    SidePlane plane{.normal = side / ((first ? 1 : -1) * cuts), .offset = 0, .front_weight = 0.5};
-    if (!through_centre) plane.offset = plane.normal.dot(vertex);
+    SidePlane plane{.normal = side, .offset = through_centre ? 0 : side.dot(vertex), .scale = (first ? 1 : -1) / cuts, .front_weight = 0.5};
     // The side direction: the mean normal in the side plane (4.1). It must cross the wedge from back to front.
     const Vec3 direction = mean - side * (mean.dot(side) / side.dot(side));
     const double front = (wedge.normal - wedge.middle).dot(direction), back = (wedge.normal + wedge.middle).dot(direction);
@@ -194,32 +194,36 @@ std::array<float, WEDGE_PLANES> row_of(const Space& space, const Wedge& wedge, b
     row[4] = -1; // a ray that meets no edge: disparity -1
     if (!wedge.exists) return row;
     const bool forward = wedge.from < wedge.to;
-    const Vec3 a = space.in_part(wedge.from), b = space.in_part(wedge.to);
-    if (a.z > 0 && b.z > 0) {
-        const double x = (a.x / a.z + b.x / b.z) / 2, y = (a.y / a.z + b.y / b.z) / 2;
-        // Far from the light's axis nothing is gained by it.
-        if (std::abs(x) < 0x1p20 && std::abs(y) < 0x1p20) {
-            row[0] = static_cast<float>(x);
-            row[1] = static_cast<float>(y);
-        }
-    }
-    // What plane . t is, of the part's tangents from row[0], row[1] on, in the part's disparity.
-    const auto put = [&](std::size_t at, const Vec3& plane, double scale) {
-        const double x = plane.x * space.scale.x, y = plane.y * space.scale.y;
-        row[at] = static_cast<float>(x * scale);
-        row[at + 1] = static_cast<float>(y * scale);
-        row[at + 2] = static_cast<float>((x * static_cast<double>(row[0]) + y * static_cast<double>(row[1]) + plane.z) * scale);
+    const Vec3 a = space.in_part(forward ? wedge.from : wedge.to), b = space.in_part(forward ? wedge.to : wedge.from);
+    // What plane . t is, from the tangents row[origin] on. All in the part's disparity.
+    const auto origin = [&](std::size_t at, double x, double y) {
+        // Far from the light's axis, and behind its plane, nothing is gained by it. (False for what is not finite.)
+        const bool near = std::abs(x) < 0x1p20 && std::abs(y) < 0x1p20;
+        row[at] = static_cast<float>(near ? x : 0);
+        row[at + 1] = static_cast<float>(near ? y : 0);
     };
-    put(2, wedge.middle, 1 / space.scale_u);
-    put(5, wedge.normal * (forward ? 1 : -1), 1 / space.scale_u);
+    const auto put = [&](std::size_t at, const Vec3& plane, std::size_t from) {
+        const double x = plane.x * space.scale.x, y = plane.y * space.scale.y;
+        row[at] = static_cast<float>(x / space.scale_u);
+        row[at + 1] = static_cast<float>(y / space.scale_u);
+        row[at + 2] =
+            static_cast<float>((x * static_cast<double>(row[from]) + y * static_cast<double>(row[from + 1]) + plane.z) / space.scale_u);
+    };
+    origin(0, (a.x / a.z + b.x / b.z) / 2, (a.y / a.z + b.y / b.z) / 2);
+    put(2, wedge.middle, 0);
+    put(5, wedge.normal * (forward ? 1 : -1), 0);
     for (std::size_t end = 0; end < 2; ++end) {
         const SidePlane& side = wedge.sides[forward ? end : 1 - end];
-        put(8 + 4 * end, side.normal, 1 / space.scale_u);
-        row[11 + 4 * end] = static_cast<float>(-side.offset);
-        row[16 + end] = static_cast<float>(forward ? side.front_weight : 1 - side.front_weight);
+        const std::size_t at = 8 + 7 * end;
+        const Vec3& vertex = end == 0 ? a : b;
+        origin(at, vertex.x / vertex.z, vertex.y / vertex.z);
+        put(at + 2, side.normal, at);
+        row[at + 5] = static_cast<float>(-side.offset);
+        row[at + 6] = static_cast<float>(side.scale);
+        row[22 + end] = static_cast<float>(forward ? side.front_weight : 1 - side.front_weight);
     }
-    row[18] = smooth ? 1 : 0;
-    row[19] = wedge.from == wedge.to ? 1 : 0;
+    row[24] = smooth ? 1 : 0;
+    row[25] = wedge.from == wedge.to ? 1 : 0;
     return row;
 }
 

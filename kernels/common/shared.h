@@ -40,7 +40,7 @@ typedef struct {
 
 // What casts, as soft_shadow_volume's kernels search it: sheets of light-facing triangles with the edges around them, in groups of WEDGE_GROUP.
 #define WEDGE_GROUP 16
-#define WEDGE_PLANES 20 // floats an edge for linear coverage: wedge_linear.clh
+#define WEDGE_PLANES 26 // floats an edge for linear coverage: wedge_linear.clh
 typedef struct {
     int edges_begin, edges_end;         // groups of edges
     int triangles_begin, triangles_end; // groups of triangles
