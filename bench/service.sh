@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The service under load: time outside compute, masks a second beside the library's own, overload, kept scenes. CSV on standard output;
+# The service under load: time outside compute, masks a second beside the library's own, overload; kept scenes. CSV on standard output;
 # bench/service_table.sh makes tables of it,
 # docs/service_load.md has them.
 #     bench/service.sh > out/bench/service.csv       about four minutes; needs a build as bench/run.sh does, wrk (Debian: apt install wrk),
@@ -83,21 +83,21 @@ for run in $(seq "$runs"); do
     bits /v1/masks $pfm "$folder/pfm.body" "$form" "$folder/library.pfm"
     bits /v1/masks $png "$folder/heavy.body" "$form" "$folder/heavy.png"
     for clients in 1 2; do
-        load 'EXR in, PNG out' $clients "$folder/exr.body" "$form" $png /v1/masks
-        load 'PFM in, PFM out' $clients "$folder/pfm.body" "$form" $pfm /v1/masks
-        load 'EXR in, PNG out; 512 texels' $clients "$folder/heavy.body" "$form" $png /v1/masks
+        load 'EXR to PNG' $clients "$folder/exr.body" "$form" $png /v1/masks
+        load 'PFM to PFM' $clients "$folder/pfm.body" "$form" $pfm /v1/masks
+        load 'EXR to PNG; 512 texels' $clients "$folder/heavy.body" "$form" $png /v1/masks
     done
 
     scene=$(curl -sS --fail-with-body -H "Content-Type: $form" --data-binary "@$folder/exr.body" "$url/v1/scenes" | jq -r .id)
     bits "/v1/scenes/$scene/masks" $png "$folder/same.body" application/json "$folder/library.png"
     for clients in 1 2; do
-        load 'kept scene, another light each' $clients "$folder/light.body" application/json $png "/v1/scenes/$scene/masks"
-        load 'kept scene, unchanged' $clients "$folder/same.body" application/json $png "/v1/scenes/$scene/masks"
+        load 'kept scene; another light each' $clients "$folder/light.body" application/json $png "/v1/scenes/$scene/masks"
+        load 'kept scene; unchanged' $clients "$folder/same.body" application/json $png "/v1/scenes/$scene/masks"
     done
 
     start
-    BENCH_ANSWERS=wait load 'overload, Retry-After heeded' $overload "$folder/exr.body" "$form" $png /v1/masks
-    BENCH_ANSWERS=now load 'overload, asked again at once' $overload "$folder/exr.body" "$form" $png /v1/masks
+    BENCH_ANSWERS=wait load 'overload; Retry-After heeded' $overload "$folder/exr.body" "$form" $png /v1/masks
+    BENCH_ANSWERS=now load 'overload; asked again at once' $overload "$folder/exr.body" "$form" $png /v1/masks
 
     start --slots 1 --queue 0
     hold_places
