@@ -270,13 +270,13 @@ inline intn behind_triangle(__global const float* triangle, const WedgeLight lig
 inline Tile tile_of(const float8 box, const WedgeLight light, const float4 eye)
 {
     Tile tile;
-    // x0 = least xi - centre * d over the tile, whichever end of d gives it.
+    // Rounded as receivers_at does, which is monotone in both: the box holds its receivers to the bit, whichever end of d gives the least and the greatest.
     const float d0 = box.s4 * light.scale_d, d1 = box.s5 * light.scale_d;
-    const float2 shift0 = (float2)(light.centre_x, light.centre_y) * d0, shift1 = (float2)(light.centre_x, light.centre_y) * d1;
-    tile.x0 = box.s0 * light.scale_x - fmax(shift0.x, shift1.x);
-    tile.x1 = box.s1 * light.scale_x - fmin(shift0.x, shift1.x);
-    tile.y0 = box.s2 * light.scale_y - fmax(shift0.y, shift1.y);
-    tile.y1 = box.s3 * light.scale_y - fmin(shift0.y, shift1.y);
+    const float x0 = box.s0 * light.scale_x, x1 = box.s1 * light.scale_x, y0 = box.s2 * light.scale_y, y1 = box.s3 * light.scale_y;
+    tile.x0 = fmin(fma(-light.centre_x, d0, x0), fma(-light.centre_x, d1, x0));
+    tile.x1 = fmax(fma(-light.centre_x, d0, x1), fma(-light.centre_x, d1, x1));
+    tile.y0 = fmin(fma(-light.centre_y, d0, y0), fma(-light.centre_y, d1, y0));
+    tile.y1 = fmax(fma(-light.centre_y, d0, y1), fma(-light.centre_y, d1, y1));
     tile.d = d0;
     if (eye.w > 0.0f) {
         tile.x0 = fmin(tile.x0, eye.x);
@@ -288,9 +288,12 @@ inline Tile tile_of(const float8 box, const WedgeLight light, const float4 eye)
     tile.reach = (float2)(light.reach_x, light.reach_y);
 #if LIGHT == 1
     // The disc that faces a receiver is tilted: a line that passes the centre within the radius meets the plane z = 0 within q, q <= (1 + t + q d), as the line's
-    // own tangent is below t + q d. No bound, so no culling, where the receiver may be as near as the radius.
+    // own tangent is below t + q d. No bound, so no culling, where the receiver may be as near as the radius; nor is all that hides the disc then nearer to the
+    // light's plane than the receiver: it may be as far from it as the disc reaches, z = 1.
     const float t = fmax(fabs(tile.x0), fabs(tile.x1)) + fmax(fabs(tile.y0), fabs(tile.y1));
-    tile.reach *= d1 < 0.984375f ? (1.0f + t) / (1.0f - d1) : 0x1p60f;
+    const bool beside = d1 >= 0.984375f;
+    tile.reach *= beside ? 0x1p60f : (1.0f + t) / (1.0f - d1);
+    if (beside) tile.d = fmin(tile.d, 0.5f);
 #endif
     return tile;
 }
