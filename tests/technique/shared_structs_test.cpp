@@ -71,10 +71,34 @@ TEST(SharedStructs, OccluderView)
     EXPECT_EQ(sizeof(OccluderView), 8 * 4u);
 }
 
+TEST(SharedStructs, Sheet)
+{
+    const std::vector<cl_int> host = {sizeof(Sheet), HERE(Sheet, edges_begin), HERE(Sheet, edges_end), HERE(Sheet, triangles_begin),
+                                      HERE(Sheet, triangles_end)};
+    EXPECT_EQ(on_device(writes("Sheet", {"edges_begin", "edges_end", "triangles_begin", "triangles_end"}), host.size()), host);
+    EXPECT_EQ(sizeof(Sheet), 4 * 4u);
+}
+
+TEST(SharedStructs, WedgeLight)
+{
+    const std::vector<std::string> members = {"scale_x", "scale_y", "scale_d", "centre_x",  "centre_y",       "reach_x",
+                                              "reach_y", "bias_x",  "bias_y",  "precision", "position_error", "share",
+                                              "sheets",  "overlap", "culling", "first"};
+    const std::vector<cl_int> host = {sizeof(WedgeLight),        HERE(WedgeLight, scale_x),   HERE(WedgeLight, scale_y),
+                                      HERE(WedgeLight, scale_d), HERE(WedgeLight, centre_x),  HERE(WedgeLight, centre_y),
+                                      HERE(WedgeLight, reach_x), HERE(WedgeLight, reach_y),   HERE(WedgeLight, bias_x),
+                                      HERE(WedgeLight, bias_y),  HERE(WedgeLight, precision), HERE(WedgeLight, position_error),
+                                      HERE(WedgeLight, share),   HERE(WedgeLight, sheets),    HERE(WedgeLight, overlap),
+                                      HERE(WedgeLight, culling), HERE(WedgeLight, first)};
+    EXPECT_EQ(on_device(writes("WedgeLight", members), host.size()), host);
+    // Every member is listed: 11 floats, a share for each channel, 4 ints.
+    EXPECT_EQ(sizeof(WedgeLight), 11 * 4u + sizeof(WedgeLight::share) + 4 * 4u);
+}
+
 TEST(SharedStructs, Constants)
 {
-    const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff}; // the largest float
-    EXPECT_EQ(on_device("    out[0] = TILE_WIDTH; out[1] = BLOCK; out[2] = as_int(NO_RECEIVER);\n", 3), host);
+    const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff, WEDGE_GROUP}; // the largest float
+    EXPECT_EQ(on_device("    out[0] = TILE_WIDTH; out[1] = BLOCK; out[2] = as_int(NO_RECEIVER); out[3] = WEDGE_GROUP;\n", 4), host);
     EXPECT_EQ(NO_RECEIVER, std::numeric_limits<float>::max());
 }
 

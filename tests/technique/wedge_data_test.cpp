@@ -1,0 +1,151 @@
+// Silhouettes as arrays for the kernel: what is counted, padded and boxed.
+#include "technique/soft_shadow_volume_run.hpp"
+
+#include "technique/wedge_data.hpp"
+
+namespace penumbra::test {
+namespace {
+
+WedgeData data_of(const std::vector<TriangleMesh>& meshes, const Light& light, bool apart = true, bool edges_too = true, int splits = 1,
+                  std::size_t part = 0)
+{
+    const LightFrame frame = light_frame(light);
+    const Topology topology = topology_of(meshes);
+    const LightPart own = parts_of(frame, splits).at(part);
+    return wedge_data(topology, silhouette_of(topology, own.centre), frame, own, apart, edges_too);
+}
+
+TEST(LightParts, CoverTheRectangle)
+{
+    const LightFrame frame = light_frame(rectangle_light(0.75, 0.5));
+    for (const int splits : {1, 2, 3, 16}) {
+        const std::vector<LightPart> parts = parts_of(frame, splits);
+        ASSERT_EQ(parts.size(), static_cast<std::size_t>(splits * splits));
+        double share = 0, low = 1e9, high = -1e9;
+        Vec3 middle(0, 0, 0);
+        for (const LightPart& part : parts) {
+            share += part.share;
+            middle += part.centre * part.share;
+            low = std::min(low, part.centre.x - part.half.x);
+            high = std::max(high, part.centre.x + part.half.x);
+            EXPECT_DOUBLE_EQ(part.half.y, 0.5 / splits);
+            EXPECT_NEAR(part.centre_x * part.half.x, part.centre.x, 1e-15); // a few roundings of numbers below 1
+            EXPECT_NEAR(part.centre_y * part.half.y, part.centre.y, 1e-15);
+        }
+        EXPECT_NEAR(share, 1, splits * splits * 0x1p-53);
+        EXPECT_NEAR(low, -0.75, 1e-15);
+        EXPECT_NEAR(high, 0.75, 1e-15);
+        EXPECT_NEAR(middle.length(), 0, 1e-15);
+    }
+}
+
+TEST(LightParts, LightsWithoutExtent)
+{
+    const std::vector<LightPart> line = parts_of(light_frame(rectangle_light(2, 0)), 2);
+    ASSERT_EQ(line.size(), 4u);
+    EXPECT_EQ(line[0].half.y, 2 * 0x1p-12 / 2);
+    for (const Light& light : {Light(point_light()), Light(sphere_light(0))}) {
+        const std::vector<LightPart> point = parts_of(light_frame(light), 3);
+        ASSERT_EQ(point.size(), 1u);
+        EXPECT_EQ(point[0].half, Vec3(1, 1, 1));
+        EXPECT_EQ(point[0].share, 1);
+    }
+    EXPECT_EQ(parts_of(light_frame(sphere_light(0.25)), 1).front().half, Vec3(0.25, 0.25, 0.25));
+}
+
+TEST(WedgeData, CountsAndPadding)
+{
+    const std::vector<TriangleMesh> meshes = {sheet(-1, 1, -1, 1, 4), closed_box({2, 2, 3}, {3, 3, 5})};
+    const WedgeData apart = data_of(meshes, rectangle_light(1, 1));
+    EXPECT_EQ(apart.sheets.size(), 2u);
+    EXPECT_EQ(apart.edge_count, 4u + 6u); // the box shows its centre three faces
+    EXPECT_EQ(apart.triangle_count, 2u + 6u);
+    EXPECT_EQ(apart.edges.size(), 2u * WEDGE_GROUP * 8);
+    EXPECT_EQ(apart.edge_ends.size(), 2u * WEDGE_GROUP * 6);
+    EXPECT_EQ(apart.triangles.size(), 2u * WEDGE_GROUP * 16);
+    EXPECT_EQ(apart.triangle_extents.size(), 2u * WEDGE_GROUP * 5);
+    for (const std::vector<float>& boxes : {apart.sheet_boxes, apart.edge_boxes, apart.triangle_boxes}) EXPECT_EQ(boxes.size(), 80u);
+    // What pads a group is passed in neither direction, covers nothing and is near nothing.
+    for (std::size_t i = 4; i < WEDGE_GROUP; ++i) {
+        EXPECT_EQ(apart.edges[8 * i + 6], 0.0F);
+        EXPECT_EQ(apart.edge_ends[2 * 16 + i], -1.0F);
+        EXPECT_EQ(apart.edge_ends[5 * 16 + i], -1.0F);
+    }
+    for (std::size_t i = 2; i < WEDGE_GROUP; ++i) {
+        EXPECT_EQ(apart.triangle_extents[64 + i], -1.0F);
+        for (std::size_t k = 9; k < 12; ++k) EXPECT_EQ(apart.triangles[16 * i + k], 0.0F);
+    }
+
+    const WedgeData together = data_of(meshes, rectangle_light(1, 1), false);
+    EXPECT_EQ(together.sheets.size(), 1u);
+    EXPECT_EQ(together.edge_count, apart.edge_count);
+    EXPECT_EQ(together.triangle_count, apart.triangle_count);
+    EXPECT_EQ(together.edges.size(), 1u * WEDGE_GROUP * 8);
+
+    const WedgeData hard = data_of(meshes, point_light(), true, false);
+    EXPECT_EQ(hard.edge_count, 0u);
+    EXPECT_EQ(hard.triangle_count, 8u);
+
+    const WedgeData none = data_of({}, rectangle_light(1, 1));
+    EXPECT_TRUE(none.sheets.empty());
+    EXPECT_EQ(none.sheet_boxes.size(), 80u); // still a block to read, which meets nothing
+    EXPECT_EQ(none.sheet_boxes[64], -1.0F);
+}
+
+// In half extents from the part's centre, lower number first.
+TEST(WedgeData, EdgesInTheUnitsOfTheLight)
+{
+    const WedgeData data = data_of({sheet(-1, 1, -2, 2, 4)}, rectangle_light(0.5, 0.25), true, true, 2, 3);
+    const LightPart part = parts_of(light_frame(rectangle_light(0.5, 0.25)), 2).at(3);
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float* edge = data.edges.data() + 8 * i;
+        for (const std::size_t end : {0u, 3u}) {
+            EXPECT_EQ(std::abs(edge[end] * part.half.x + part.centre.x), 1) << i;
+            EXPECT_EQ(std::abs(edge[end + 1] * part.half.y + part.centre.y), 2) << i;
+            EXPECT_EQ(edge[end + 2], 4.0F);
+        }
+        EXPECT_EQ(std::abs(edge[6]), 1.0F);
+    }
+}
+
+// Behind the light's plane nothing hides anything from a rectangle; a disc turns with the receiver, so all may.
+TEST(WedgeData, WhatLiesBehindTheLight)
+{
+    const std::vector<TriangleMesh> meshes = {sheet(-1, 1, -1, 1, -2), sheet(-1, 1, -1, 1, 4)};
+    const WedgeData rectangle = data_of(meshes, rectangle_light(1, 1)), disc = data_of(meshes, sphere_light(1));
+    EXPECT_EQ(rectangle.sheets.size(), 1u);
+    EXPECT_EQ(rectangle.edge_count, 4u);
+    EXPECT_EQ(disc.sheets.size(), 2u);
+    EXPECT_EQ(disc.edge_count, 8u);
+    // Across the plane: kept, and its box is everywhere.
+    const WedgeData across = data_of({sheet({Vec3(2, -1, -1), Vec3(3, -1, 4), Vec3(3, 1, 4), Vec3(2, 1, -1)})}, rectangle_light(1, 1));
+    EXPECT_EQ(across.edge_count, 3u); // the one that lies behind altogether is left out
+    EXPECT_GE(across.sheet_boxes[64], 1e18F);
+}
+
+// Boxes hold what they are for: every end of every edge, every vertex, to within the rounding of a float.
+TEST(WedgeData, BoxesHoldTheirContents)
+{
+    const WedgeData data = data_of(soup(200, {-5, -5, 1}, {5, 5, 9}, 4), rectangle_light(1, 0.5));
+    ASSERT_GT(data.sheets.size(), 100u);
+    for (std::size_t s = 0; s < data.sheets.size(); ++s) {
+        const float* const boxes = data.sheet_boxes.data() + s / 16 * 80 + s % 16;
+        for (int group = data.sheets[s].edges_begin; group < data.sheets[s].edges_end; ++group)
+            for (std::size_t i = 0; i < WEDGE_GROUP; ++i) {
+                const float* edge = data.edges.data() + (static_cast<std::size_t>(group) * WEDGE_GROUP + i) * 8;
+                if (edge[6] == 0) continue;
+                const float* own =
+                    data.edge_boxes.data() + static_cast<std::size_t>(group) / 16 * 80 + static_cast<std::size_t>(group) % 16;
+                for (const float* box : {own, boxes})
+                    for (const std::size_t end : {0u, 3u}) {
+                        const double x = static_cast<double>(edge[end]) / edge[end + 2], slack = 0x1p-22 * std::abs(x);
+                        EXPECT_GE(x, box[0] - slack);
+                        EXPECT_LE(x, box[16] + slack);
+                        EXPECT_LE(1.0 / edge[end + 2], box[64] * (1 + 0x1p-22));
+                    }
+            }
+    }
+}
+
+} // namespace
+} // namespace penumbra::test
