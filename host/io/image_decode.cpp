@@ -41,9 +41,9 @@ std::string one_line(std::string text)
 // An opened image. Closes before the bytes go.
 class Source {
 public:
-    Source(std::span<const std::byte> bytes, ImageFormat format, std::string_view where)
-        : where_(where), chunks_(format == ImageFormat::png ? pixel_chunks(bytes, where) : std::vector<std::byte>()),
-          memory_(chunks_.empty() ? bytes.data() : chunks_.data(), chunks_.empty() ? bytes.size() : chunks_.size()), format_(format)
+    Source(std::span<const std::byte> bytes, ImageFormat format, std::string_view where, std::uint64_t max_samples)
+        : where_(where), unpacked_(format == ImageFormat::png ? unpacked_png(bytes, where, max_samples) : std::vector<std::byte>()),
+          memory_(unpacked_.empty() ? bytes.data() : unpacked_.data(), unpacked_.empty() ? bytes.size() : unpacked_.size()), format_(format)
     {
         configure_openimageio();
         const std::string name = plugin(format);
@@ -149,7 +149,7 @@ private:
     }
 
     std::string_view where_;
-    std::vector<std::byte> chunks_; // of a PNG
+    std::vector<std::byte> unpacked_; // a PNG
     OIIO::Filesystem::IOMemReader memory_;
     ImageFormat format_;
     std::unique_ptr<OIIO::ImageInput> input_;
@@ -276,7 +276,7 @@ Image decode_image(std::span<const std::byte> bytes, std::string_view where, std
     if (format == ImageFormat::exr)
         if (std::optional<Image> image = plain_image(bytes, check_exr_header(bytes, where, max_samples), max_samples))
             return *std::move(image);
-    Source source(bytes, format, where);
+    Source source(bytes, format, where, max_samples);
     if (source.spec().nchannels > 4)
         throw broken(where,
                      "has " + std::to_string(source.spec().nchannels) + " channels (" + source.channel_list() + "), expected at most 4");
@@ -302,7 +302,7 @@ RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view cha
     if (format == ImageFormat::exr)
         if (std::optional<RawDepth> raw = plain_depth(bytes, check_exr_header(bytes, where, max_samples), channel, max_samples))
             return *std::move(raw);
-    Source source(bytes, format, where);
+    Source source(bytes, format, where, max_samples);
     const Pick pick = pick_depth(source, channel, where);
     if (!source.seek(pick.part)) throw broken(where, "is truncated or broken");
     source.check(max_samples);

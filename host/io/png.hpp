@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -14,9 +15,10 @@ namespace penumbra {
 // same pixels. OpenImageIO takes several times as long: zlib at level 6, and all five filters tried (docs/bench.md has times and sizes).
 std::vector<std::byte> encode_png(const Image& image, int bits);
 
-// The file with nothing but the chunks that pixels are made of (IHDR, PLTE, tRNS, IDAT, IEND). Colour profiles, gamma, text and Exif go:
-// samples are read as they stand, and libpng prints what it thinks of the others. Throws invalid_input for a file that is truncated or
-// whose checksums are wrong.
-std::vector<std::byte> pixel_chunks(std::span<const std::byte> png, std::string_view where);
+// The same pixels as a PNG that libpng reads without a complaint, which it would print: nothing but IHDR, PLTE, tRNS, IDAT (unpacked and
+// checked: libdeflate is faster than zlib) and IEND. Colour profiles, gamma, text and Exif go: samples are read as they stand. `png` begins
+// with PNG's signature. Throws too_large for more than max_samples samples, before anything is unpacked, and invalid_input for a file that
+// is truncated or broken.
+std::vector<std::byte> unpacked_png(std::span<const std::byte> png, std::string_view where, std::uint64_t max_samples);
 
 } // namespace penumbra
