@@ -52,6 +52,58 @@ constexpr std::array<Required, 8> required{{
     {"screenWindowWidth", "float", 4},
 }};
 
+// Attribute types of one size. OpenEXR reads that many bytes whatever the attribute says, so after another size it would take the middle of
+// something for an attribute, and allocate by what it finds there.
+struct Sized {
+    std::string_view type;
+    std::size_t size;
+};
+constexpr std::array<Sized, 24> sized_types{{{"box2f", 16},
+                                             {"box2i", 16},
+                                             {"chromaticities", 32},
+                                             {"compression", 1},
+                                             {"deepImageState", 1},
+                                             {"double", 8},
+                                             {"envmap", 1},
+                                             {"float", 4},
+                                             {"int", 4},
+                                             {"keycode", 28},
+                                             {"lineOrder", 1},
+                                             {"m33d", 72},
+                                             {"m33f", 36},
+                                             {"m44d", 128},
+                                             {"m44f", 64},
+                                             {"rational", 8},
+                                             {"tiledesc", 9},
+                                             {"timecode", 8},
+                                             {"v2d", 16},
+                                             {"v2f", 8},
+                                             {"v2i", 8},
+                                             {"v3d", 24},
+                                             {"v3f", 12},
+                                             {"v3i", 12}}};
+
+// Whether OpenEXR will read exactly this value. Of the other types it reads what the attribute says.
+bool has_its_size(std::string_view type, std::span<const std::byte> value)
+{
+    if (const auto sized = std::ranges::find(sized_types, type, &Sized::type); sized != sized_types.end())
+        return value.size() == sized->size;
+    if (type == "preview") {
+        if (value.size() < 8) return false;
+        const std::uint64_t pixels = std::uint64_t{little_endian(value)} * little_endian(value.subspan(4));
+        return (value.size() - 8) % 4 == 0 && pixels == (value.size() - 8) / 4;
+    }
+    if (type == "chlist") {
+        while (const auto name = take_name(value)) {
+            if (name->empty()) return value.empty();
+            if (value.size() < 16) return false;
+            value = value.subspan(16);
+        }
+        return false;
+    }
+    return true;
+}
+
 // A chlist: name, type, a byte and three of padding, two steps of subsampling; an empty name ends it. Nothing for what is not plain.
 std::vector<ExrChannel> plain_channels(std::span<const std::byte> list)
 {
@@ -169,6 +221,8 @@ private:
         if (attribute.empty()) return false;
         const std::string_view type = name();
         const std::span<const std::byte> value = take(little_endian(take(4)));
+        if (!has_its_size(type, value))
+            throw broken("its EXR header has a value of " + std::to_string(value.size()) + " bytes, which is not what its type has");
         if (attribute == "dataWindow" && type == "box2i" && value.size() == 16) check_window(value);
         if (attribute == "tiles" && type == "tiledesc" && value.size() == 9)
             check_area(little_endian(value), little_endian(value.subspan(4)), "tiles");

@@ -276,12 +276,12 @@ void run_all(const Arguments& arguments)
 
 // The sanitizers' defaults; ASAN_OPTIONS and UBSAN_OPTIONS of the environment come on top. Aborting ends in end_with_input. Too large a
 // request for memory is a failure, and so is one that new would answer with an exception.
-extern "C" const char* __asan_default_options();
+extern "C" __attribute__((visibility("default"))) const char* __asan_default_options();
 extern "C" const char* __asan_default_options()
 {
     return "abort_on_error=1:allocator_may_return_null=0:quarantine_size_mb=64:max_allocation_size_mb=128"; // most_allocation_mb
 }
-extern "C" const char* __ubsan_default_options();
+extern "C" __attribute__((visibility("default"))) const char* __ubsan_default_options();
 extern "C" const char* __ubsan_default_options() { return "abort_on_error=1"; }
 
 std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size)

@@ -214,6 +214,36 @@ TEST(Image, ExrHeadersThatClaimTheSkyAreRefused)
     }
 }
 
+TEST(Image, ExrValuesOfAnotherSizeThanTheirTypeAreRefused)
+{
+    // OpenEXR would read as many bytes as the type has, and the next attribute out of the middle of something.
+    const std::vector<std::byte> whole = encode_image(ramp(4, 4, 1), {"exr", 32});
+    for (const std::string_view type :
+         {std::string_view("chlist\0", 7), std::string_view("compression\0", 12), std::string_view("box2i\0", 6),
+          std::string_view("float\0", 6), std::string_view("v2f\0", 4), std::string_view("lineOrder\0", 10)}) {
+        const std::string_view text(reinterpret_cast<const char*>(whole.data()), whole.size());
+        std::size_t at = text.find(type) + type.size();
+        if (type.starts_with("compression") || type.starts_with("lineOrder")) at = text.find(type, at) + type.size(); // names as well
+        for (const int change : {-1, 1}) {
+            std::vector<std::byte> bytes = whole;
+            bytes[at] = static_cast<std::byte>(std::to_integer<int>(bytes[at]) + change);
+            const auto value = bytes.begin() + static_cast<std::ptrdiff_t>(at) + 4;
+            if (change < 0)
+                bytes.erase(value);
+            else
+                bytes.insert(value, std::byte{0});
+            EXPECT_MENTIONS(error_of([&] { decode_image(bytes, "x"); }), "not what its type has");
+        }
+    }
+    // A preview has the size of its pixels.
+    const std::string_view preview("preview\0preview\0\x0c\0\0\0\1\0\0\0\1\0\0\0\1\2\3\4", 32);
+    std::vector<std::byte> bytes = whole;
+    const auto inserted = bytes.insert(bytes.begin() + 8, reinterpret_cast<const std::byte*>(preview.data()),
+                                       reinterpret_cast<const std::byte*>(preview.data()) + preview.size());
+    inserted[20] = std::byte{2};
+    EXPECT_MENTIONS(error_of([&] { decode_image(bytes, "x"); }), "not what its type has");
+}
+
 TEST(Pfm, StandsBottomUpInEitherByteOrder)
 {
     const std::string header = "Pf\n1 2\n";
