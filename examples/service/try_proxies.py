@@ -281,6 +281,8 @@ def gone(t):
         return str(t.get("/healthz"))
     except ConnectionRefusedError:
         return "refused"
+    except ConnectionResetError:
+        return "reset"  # it was about to end
 
 
 CHECKS = {
