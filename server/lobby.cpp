@@ -14,9 +14,8 @@
 namespace penumbra::server {
 namespace {
 
-// How long, and how much of, what a refused client still sends is read.
+// How long what a refused client still sends is read.
 constexpr std::chrono::seconds forget_time{2};
-constexpr std::size_t forget_bytes = std::size_t{4} << 20;
 
 // How long headers may take when somebody else needs the place.
 constexpr std::chrono::seconds patience{1};
@@ -186,7 +185,7 @@ void Lobby::forget(Guests::iterator guest)
     std::array<char, 65536> buffer;
     const ssize_t got = ::recv(guest->first, buffer.data(), buffer.size(), MSG_DONTWAIT);
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
-    if (got <= 0 || (guest->second.done += static_cast<std::size_t>(got)) > forget_bytes) close(guest);
+    if (got <= 0 || (guest->second.done += static_cast<std::size_t>(got)) > limits_.forget_bytes) close(guest);
 }
 
 void Lobby::hand_over(Guests::iterator guest, bool timed_out, bool ended)

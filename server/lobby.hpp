@@ -22,6 +22,7 @@ struct LobbyLimits {
     std::size_t header_bytes = 16384; // request line and headers together
     std::uint64_t answer_bytes = std::uint64_t{256}
                                  << 20; // of all answers that wait for their clients; beyond, the one that waits longest is given up
+    std::size_t forget_bytes = std::size_t{4} << 20; // of a refused request, read so that its sender gets the answer
     // The slowest transfer that is waited for: after `transfer_grace` a body, or an answer, has to have moved on at this on average.
     std::uint64_t slowest_transfer = 16384; // bytes a second
 

@@ -69,7 +69,9 @@ int serve(const Options& options, const Environment& environment)
     sigaddset(&signals, SIGINT);
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
-    if (const std::string unknown = ensure_descriptors(); !unknown.empty()) say("warning: " + unknown);
+    if (const std::string unknown = ensure_descriptors(static_cast<std::uint64_t>(options.connections) + descriptors_beside);
+        !unknown.empty())
+        say("warning: " + unknown);
     const Notifier notifier(environment);
     opencl::prepare_environment();
     Service service(options, options.device.empty() ? Engine() : Engine(options.device), say);

@@ -31,6 +31,7 @@ LobbyLimits limits_of(const Options& options)
             .header_time = std::chrono::seconds(options.header_s),
             .header_bytes = static_cast<std::size_t>(options.header_bytes),
             .answer_bytes = static_cast<std::uint64_t>(options.answer_bytes),
+            .forget_bytes = static_cast<std::size_t>(options.body_bytes),
             .slowest_transfer = static_cast<std::uint64_t>(options.transfer_bytes_s)};
 }
 
