@@ -64,6 +64,23 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
             .triangles = floats(data.triangles, "triangles")};
 }
 
+// The kernel adds the parts in this order and rounds each time: the last share becomes what the others leave, so that the whole light comes
+// out as 1 to the bit. Where the others round to more, the largest gives way.
+void complete_shares(std::vector<PreparedSoftShadowVolume::Part>& parts)
+{
+    for (;;) {
+        float sum = 0;
+        std::size_t largest = 0;
+        for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
+            sum += parts[i].light.share;
+            if (parts[i].light.share > parts[largest].light.share) largest = i;
+        }
+        parts.back().light.share = 1 - sum;
+        if (sum <= 1) return;
+        parts[largest].light.share = std::nextafter(parts[largest].light.share, 0.0F);
+    }
+}
+
 // The receivers' camera as the part's tiles see it (the kernel's `eye`).
 cl_float4 eye_of(const ReceiverView& view, const WedgeLight& light, bool wanted)
 {
@@ -128,6 +145,7 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
         prepared.sheets += silhouette.sheets();
         prepared.parts.push_back(upload(work, data, wedge_light(frame, part, casters, settings, static_cast<int>(data.sheets.size()))));
     }
+    complete_shares(prepared.parts);
     return prepared;
 }
 
