@@ -12,6 +12,7 @@
 //   LIGHT        0 rectangle, 1 sphere (the disc that faces the receiver)
 //   COVERAGE     0 linear (Paper I), 1 analytic (Paper IV, 4.2), 2 texture (Paper III, 3.3)
 //   CHANNELS     of the light: 1, or 3 for a coloured texture
+//   LOOKUP       of the table: 0 nearest, 1 bilinear in the second end, 2 bilinear in both
 //   ACCUMULATOR  0 binary32; the papers' buffers, emulated: 1 signed 16 bits with 255 levels (Paper I), 2 six bits (Paper III), 3 twelve bits (Paper IV)
 //
 // Light space here: x and y in the light's half extents (its radius: z as well), so that the light is [-1, 1]^2 or the unit disc. A receiver is its tangents
@@ -20,6 +21,7 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/lanes.clh"
+#include "coverage_table.cl"
 
 // LANES receivers.
 typedef struct {
@@ -133,11 +135,10 @@ inline float2 before_light(const float az, const float bz)
     return (float2)(az < 0.0f ? at : 0.0f, bz < 0.0f ? at : 1.0f);
 }
 
+#include "common/wedge_analytic.clh"
 #if COVERAGE == 0
 #include "common/wedge_linear.clh"
-#elif COVERAGE == 1
-#include "common/wedge_analytic.clh"
-#else
+#elif COVERAGE == 2
 #include "common/wedge_table.clh"
 #endif
 
@@ -413,6 +414,9 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                     uint bits = light.culling == 0 ? 0xffffu : bits_of(edges_meet(tile, edge_ends + group * 96, light.culling == 1));
                     while (bits) {
                         const int index = group * 16 + take_bit(&bits);
+#if COVERAGE == 0
+                        if (light.culling != 0 && !wedge_meets(tile, coverage + index * WEDGE_PLANES)) continue;
+#endif
                         const float8 e = vload8(index, edges);
                         const Edge edge = {e.s0, e.s1, e.s2, e.s3, e.s4, e.s5, e.s6};
                         ++count.x;
@@ -435,7 +439,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
 
     for (int channel = 0; channel < CHANNELS; ++channel)
         for (int row = 0; row < ITEM_ROWS && y + row < view.height; ++row)
-            write_visibility(visibility + ((y + row) * view.width + x) * CHANNELS + channel, light.share * (1.0f - saturate(occlusion[channel][row])),
+            write_visibility(visibility + ((y + row) * view.width + x) * CHANNELS + channel, light.share[channel] * (1.0f - saturate(occlusion[channel][row])),
                              view.width - x, !light.first);
     if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[number] = light.first ? count : evaluated[number] + count;
 }

@@ -187,6 +187,7 @@ std::shared_ptr<Prepared::State> prepare_wedges(std::shared_ptr<Prepared::State>
     opencl::Work work(state->context);
     work.stage("prepare");
     PreparedSoftShadowVolume prepared = prepare_soft_shadow_volume(work, light, {.topology = *topology, .texel = texel}, settings);
+    state->warnings.insert(state->warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     if (prepared.triangles == 0) state->warnings.push_back("no triangle faces the light: nothing casts shadows");
     state->data = std::move(prepared);
     add_stages(state->stages, work.finish());

@@ -37,6 +37,22 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
         shade_shadow_map(work, std::get<PreparedShadowMap>(state.data), points, visibility);
 }
 
+bool has_emission(const Light& light)
+{
+    const auto* rectangle = std::get_if<RectangleLight>(&light);
+    return rectangle && rectangle->emission;
+}
+
+// A mask of a textured light has three channels, a grey texture's as well.
+void make_grey(Image& image)
+{
+    std::vector<float> pixels;
+    pixels.reserve(image.pixels.size() * 3);
+    for (const float value : image.pixels) pixels.insert(pixels.end(), 3, value);
+    image.pixels = std::move(pixels);
+    image.channels = 3;
+}
+
 // The program that the state was prepared with.
 const opencl::Specialisation& program_of(const Prepared::State& state)
 {
@@ -88,7 +104,9 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
         return receiver_points(work, receiver_view(view, depth.width, depth.height, state.light_view), uploaded.memory(), depth.precision,
                                program_of(state));
     };
-    const auto visibility = work.buffer<float>(count, "visibility");
+    const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data);
+    const std::size_t channels = wedges ? static_cast<std::size_t>(wedges->channels) : 1;
+    const auto visibility = work.buffer<float>(count * channels, "visibility");
     ShadeCounts counts;
     if (light_resolution > 0) {
         const ReceiverPoints lit_points = points_of(from_light, state.light_view);
@@ -105,6 +123,8 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
     }
     work.stage("read back");
     mask.visibility.pixels = work.read(visibility);
+    mask.visibility.channels = static_cast<int>(channels);
+    if (has_emission(state.light) && channels == 1) make_grey(mask.visibility);
 
     add_stages(mask.report.stages, work.finish());
     mask.report.shade_ms = work_ms(mask.report.stages);
@@ -148,6 +168,9 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
     if (const auto* soft = std::get_if<SoftShadowMap>(&state.technique); soft && soft->project)
         throw Error(ErrorCode::unsupported, "project renders the receivers from the light on the host and cannot shade device buffers",
                     "set project to false");
+    if (has_emission(state.light))
+        throw Error(ErrorCode::unsupported, "a textured light's mask has three channels and cannot be shaded into a device buffer",
+                    "shade a depth map in memory");
     check_device_buffer(receivers.depth, receivers.width, receivers.height, "receivers.depth");
     check_device_buffer(visibility, receivers.width, receivers.height, "visibility");
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");

@@ -26,6 +26,7 @@ opencl::Specialisation SoftShadowVolumeConstants::specialisation() const
              {"LIGHT", std::to_string(light)},
              {"COVERAGE", std::to_string(coverage)},
              {"CHANNELS", std::to_string(channels)},
+             {"LOOKUP", std::to_string(lookup)},
              {"ACCUMULATOR", std::to_string(accumulator)}}};
 }
 
@@ -43,6 +44,12 @@ std::vector<opencl::Specialisation> every_specialisation()
                 all.push_back(SoftShadowVolumeConstants{
                     .lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .light = light, .accumulator = accumulator}
                                   .specialisation());
+    // Linear coverage takes every light for a sphere.
+    for (const int lanes : {1, 8, 16})
+        for (const int accumulator : {0, 1, 2, 3})
+            all.push_back(SoftShadowVolumeConstants{
+                .lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .light = 0, .coverage = 0, .accumulator = accumulator}
+                              .specialisation());
     return all;
 }
 

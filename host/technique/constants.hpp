@@ -43,6 +43,7 @@ struct SoftShadowVolumeConstants {
     int light = 0;       // 0 rectangle, 1 disc
     int coverage = 1;    // in the order of Coverage
     int channels = 1;    // of the light
+    int lookup = 2;      // in the order of Lookup
     int accumulator = 0; // in the order of WedgeBuffer
     opencl::Specialisation specialisation() const;
 };

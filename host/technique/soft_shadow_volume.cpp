@@ -6,18 +6,47 @@
 #include <penumbra/error.hpp>
 
 #include "technique/constants.hpp"
+#include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
+#include "technique/linear_wedges.hpp"
 #include "technique/rows.hpp"
 
 namespace penumbra {
 namespace {
 
-SoftShadowVolumeConstants constants_of(const opencl::Context& context, const LightFrame& light, const SoftShadowVolume& settings)
+const Image* emission_of(const Light& light)
+{
+    const auto* rectangle = std::get_if<RectangleLight>(&light);
+    return rectangle && rectangle->emission ? &*rectangle->emission : nullptr;
+}
+
+void check_settings(const Light& light, const SoftShadowVolume& settings)
+{
+    const LightFrame frame = light_frame(light);
+    const auto refuse = [&](const std::string& what, const std::string& expected) {
+        throw Error(ErrorCode::invalid_input, "technique." + what + " and the light a " + kind_of(light), expected);
+    };
+    if (settings.light_splits > 1 && frame.shape != LightShape::rectangle)
+        refuse("light_splits: is " + std::to_string(settings.light_splits), "expected 1: only rectangles are split");
+    if (settings.coverage == Coverage::texture && !std::holds_alternative<RectangleLight>(light))
+        refuse("coverage: is texture", "expected a rectangle, or coverage analytic");
+    if (settings.coverage == Coverage::texture && settings.table % 2 != 0)
+        throw Error(ErrorCode::invalid_input, "technique.table: is " + std::to_string(settings.table),
+                    "expected an even number from 4 to 64");
+    if (emission_of(light) && settings.coverage != Coverage::texture)
+        throw Error(ErrorCode::invalid_input, "light.emission: needs coverage texture", "set technique.coverage to \"texture\"");
+}
+
+SoftShadowVolumeConstants constants_of(const opencl::Context& context, const LightFrame& light, const SoftShadowVolume& settings,
+                                       int channels)
 {
     const int lanes = context.quirks().lanes;
     return {.lanes = lanes,
             .item_rows = lanes == 1 ? 1 : tile_rows,
-            .light = light.shape == LightShape::disc ? 1 : 0,
+            .light = light.shape == LightShape::disc && settings.coverage != Coverage::linear ? 1 : 0,
+            .coverage = static_cast<int>(settings.coverage),
+            .channels = channels,
+            .lookup = settings.coverage == Coverage::texture ? static_cast<int>(settings.lookup) : 2,
             .accumulator = static_cast<int>(settings.buffer)};
 }
 
@@ -39,7 +68,7 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
             .bias_y = static_cast<float>(bias * casters.texel.y * part.half.z / part.half.y),
             .precision = 0,
             .position_error = 0,
-            .share = static_cast<float>(part.share),
+            .share = {static_cast<float>(part.share), static_cast<float>(part.share), static_cast<float>(part.share)},
             .sheets = sheets,
             .overlap = static_cast<int>(settings.overlap),
             .culling = settings.culling == WedgeCulling::none    ? 0
@@ -55,6 +84,7 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
     };
     return {.light = light,
             .sheets = work.upload(std::span<const Sheet>(data.sheets), "sheets"),
+            .coverage = {},
             .sheet_boxes = floats(data.sheet_boxes, "boxes of sheets"),
             .edge_boxes = floats(data.edge_boxes, "boxes of edges"),
             .edge_ends = floats(data.edge_ends, "ends of edges"),
@@ -64,20 +94,39 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
             .triangles = floats(data.triangles, "triangles")};
 }
 
+// What the linear wedges of all parts leave to be said.
+std::vector<std::string> linear_warnings(const LightFrame& frame, const PreparedSoftShadowVolume& prepared, std::uint64_t left_out,
+                                         std::uint64_t unshared)
+{
+    std::vector<std::string> warnings;
+    if (frame.shape != LightShape::disc)
+        warnings.push_back("linear coverage takes the rectangle for the sphere around it: penumbrae are as wide as of that sphere");
+    if (left_out > 0)
+        warnings.push_back(std::to_string(left_out) + " of " + std::to_string(prepared.edges) +
+                           " silhouette edges point at the light's centre and have no wedge");
+    if (unshared > 0)
+        warnings.push_back(std::to_string(unshared) + " of " + std::to_string(prepared.edges) +
+                           " neighbouring wedges share no side plane that holds their fronts and backs: light may leak along it");
+    return warnings;
+}
+
 // The kernel adds the parts in this order and rounds each time: the last share becomes what the others leave, so that the whole light comes
 // out as 1 to the bit. Where the others round to more, the largest gives way.
 void complete_shares(std::vector<PreparedSoftShadowVolume::Part>& parts)
 {
-    for (;;) {
-        float sum = 0;
-        std::size_t largest = 0;
-        for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
-            sum += parts[i].light.share;
-            if (parts[i].light.share > parts[largest].light.share) largest = i;
+    for (std::size_t c = 0; c < std::size(WedgeLight{}.share); ++c) {
+        const auto share = [&](std::size_t i) -> float& { return parts[i].light.share[c]; };
+        for (;;) {
+            float sum = 0;
+            std::size_t largest = 0;
+            for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
+                sum += share(i);
+                if (share(i) > share(largest)) largest = i;
+            }
+            share(parts.size() - 1) = 1 - sum;
+            if (sum <= 1) break;
+            share(largest) = std::nextafter(share(largest), 0.0F);
         }
-        parts.back().light.share = 1 - sum;
-        if (sum <= 1) return;
-        parts[largest].light.share = std::nextafter(parts[largest].light.share, 0.0F);
     }
 }
 
@@ -100,10 +149,18 @@ TechniqueRow soft_shadow_volume_row()
         .summary =
             "Penumbra wedges: the hard shadow of the light's centre, corrected around each silhouette edge. Exact for planar casters.",
         .source = "Assarsson: A Real-Time Soft Shadow Volume Algorithm, 2003 (Papers I to V)",
-        .keys = {choice_key<S>("overlap", &S::overlap, {"sum", "max", "half_min", "product"},
+        .keys = {choice_key<S>("coverage", &S::coverage, {"linear", "analytic", "texture"},
+                               "an edge's share of the light: Paper I's wedge, the closed form, or a table, which textured lights need"),
+                 flag_key<S>("smooth", &S::smooth, "linear: light intensity s becomes 3 s^2 - 2 s^3"),
+                 integer_key<S>("corner_wedges", &S::corner_wedges, {0, 16}, "wedges",
+                                "linear: extra wedges at a corner of 0 degrees; fewer up to a right angle, where there are none"),
+                 choice_key<S>("overlap", &S::overlap, {"sum", "max", "half_min", "product"},
                                "how sheets of triangles that hide the same light are joined; half_min is Paper IV's Eq. 1"),
                  integer_key<S>("light_splits", &S::light_splits, {1, 16}, "parts",
                                 "n x n parts of a rectangle, each with silhouettes of its own: nearer to the truth, n x n preparations"),
+                 integer_key<S>("table", &S::table, {4, 64}, "places", "texture: places an axis of the coverage table, an even number"),
+                 choice_key<S>("lookup", &S::lookup, {"nearest", "bilinear", "quadrilinear"},
+                               "texture: between the table's places; bilinear is so in one end of the edge, quadrilinear in both"),
                  choice_key<S>("buffer", &S::buffer, {"binary32", "int16", "six_bits", "twelve_bits"},
                                "what shares are added in; all but binary32 are the papers' integer buffers, for study"),
                  choice_key<S>("culling", &S::culling, {"none", "loose", "far_depth", "tight"},
@@ -111,7 +168,7 @@ TechniqueRow soft_shadow_volume_row()
                  real_key<S>("bias", &S::bias, {0, 16}, "half texels",
                              "of casters made from depth maps: how far along their slope they count as the receiver's own surface")},
         .lights = {"rectangle", "sphere", "point"},
-        .textured_lights = false,
+        .textured_lights = true,
         .inputs = "objects that cast, or front occluder depth from the light's centre; receiver depth (or objects)",
         .defaults = SoftShadowVolume{}};
 }
@@ -125,26 +182,48 @@ Camera wedge_view(const Light& light)
 PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Light& light, const Casters& casters,
                                                     const SoftShadowVolume& settings)
 {
+    check_settings(light, settings);
     const LightFrame frame = light_frame(light);
-    if (settings.light_splits > 1 && frame.shape != LightShape::rectangle)
-        throw Error(ErrorCode::invalid_input,
-                    "technique.light_splits: is " + std::to_string(settings.light_splits) + " and the light a " + kind_of(light),
-                    "expected 1: only rectangles are split");
+    const bool extent = frame.half_u > 0 || frame.half_v > 0, textured = settings.coverage == Coverage::texture;
+    const int splits = extent ? settings.light_splits : 1;
+    const EmissionSums emission = textured ? emission_sums(emission_of(light), 2 * settings.table) : EmissionSums{};
+    const EmissionPart whole = textured ? emission_part(emission, parts_of(frame, 1).front(), 1) : EmissionPart{};
     PreparedSoftShadowVolume prepared{.settings = settings,
-                                      .program = constants_of(work.context(), frame, settings).specialisation(),
+                                      .channels = emission.channels,
+                                      .program = constants_of(work.context(), frame, settings, emission.channels).specialisation(),
                                       .parts = {},
                                       .edges = 0,
                                       .triangles = 0,
-                                      .sheets = 0};
-    const bool extent = frame.half_u > 0 || frame.half_v > 0;
-    for (const LightPart& part : parts_of(frame, extent ? settings.light_splits : 1)) {
-        const Silhouette silhouette = silhouette_of(casters.topology, part.centre);
+                                      .sheets = 0,
+                                      .warnings = {}};
+    const bool linear = extent && settings.coverage == Coverage::linear;
+    std::uint64_t left_out = 0, unshared = 0;
+    for (const LightPart& part : parts_of(frame, splits)) {
+        Silhouette silhouette = silhouette_of(casters.topology, part.centre);
+        LinearWedges wedges;
+        if (linear) {
+            wedges = linear_wedges(casters.topology, std::move(silhouette), frame, part, settings.smooth, settings.corner_wedges);
+            silhouette = wedges.silhouette;
+        }
         const WedgeData data = wedge_data(casters.topology, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
         prepared.edges += data.edge_count;
         prepared.triangles += data.triangle_count;
         prepared.sheets += silhouette.sheets();
         prepared.parts.push_back(upload(work, data, wedge_light(frame, part, casters, settings, static_cast<int>(data.sheets.size()))));
+        if (linear) {
+            prepared.parts.back().coverage = work.upload(std::span<const float>(planes_in_order(wedges, data)), "planes of wedges");
+            prepared.parts.back().light.reach_x *= static_cast<float>(wedges.reach_x);
+            prepared.parts.back().light.reach_y *= static_cast<float>(wedges.reach_y);
+            left_out += wedges.left_out;
+            unshared += wedges.unshared;
+        }
+        if (!textured) continue;
+        const EmissionPart lit = emission_part(emission, part, splits);
+        prepared.parts.back().coverage = coverage_table(work, prepared.program, emission, lit, settings.table);
+        for (std::size_t c = 0; c < static_cast<std::size_t>(emission.channels); ++c)
+            prepared.parts.back().light.share[c] = static_cast<float>(lit.light[c] / whole.light[c]);
     }
+    if (linear) prepared.warnings = linear_warnings(frame, prepared, left_out, unshared);
     complete_shares(prepared.parts);
     return prepared;
 }
@@ -177,7 +256,8 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
                     width * height * 16 + part.triangles.bytes() + part.edges.bytes(), view, light,
                     eye_of(view, light, prepared.settings.culling == WedgeCulling::far_depth), part.sheets, part.sheet_boxes,
                     part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_extents, part.triangles, bounds,
-                    receivers.xi, receivers.eta, receivers.d, visibility, evaluated, opencl::Buffer<float>{}, cl_int{0});
+                    receivers.xi, receivers.eta, receivers.d, visibility, evaluated, part.coverage,
+                    static_cast<cl_int>(prepared.settings.table));
     }
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);

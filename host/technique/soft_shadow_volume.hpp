@@ -16,12 +16,15 @@ struct PreparedSoftShadowVolume {
     struct Part {
         WedgeLight light{};
         opencl::Buffer<Sheet> sheets;
+        opencl::Buffer<float> coverage; // the table of a textured light
         opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes, triangle_extents, triangles;
     };
     SoftShadowVolume settings;
+    int channels = 1; // of the visibility: 3 for a coloured texture
     opencl::Specialisation program;
     std::vector<Part> parts;
     std::uint64_t edges = 0, triangles = 0, sheets = 0; // of all parts
+    std::vector<std::string> warnings;
 };
 
 // What casts, and the texel of the depth map that it was made from (tangents; 0 for triangles).
@@ -30,15 +33,15 @@ struct Casters {
     Vec2 texel{0, 0};
 };
 
-// Throws usage for light_splits of a light that is no rectangle.
+// Throws invalid_input for settings that the light does not go with.
 PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Light& light, const Casters& casters,
                                                     const SoftShadowVolume& settings);
 
 // The view that receivers are to come in: of a right angle, so that xi and eta are tangents.
 Camera wedge_view(const Light& light);
 
-// Writes visibility, receivers.view.height x receivers.view.width. With `counts` it waits for the device to fill them in.
-// `eye`: the receivers' camera in light space, in scene units.
+// Writes visibility, receivers.view.height x receivers.view.width x prepared.channels. With `counts` it waits for the device to fill them
+// in. `eye`: the receivers' camera in light space, in scene units.
 void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const ReceiverPoints& receivers,
                               const cl::Buffer& visibility, ShadeCounts* counts);
 

@@ -46,6 +46,12 @@ typedef struct {
     int triangles_begin, triangles_end; // groups of triangles
 } Sheet;
 
+// A light's texture, or the part of it that a coverage table is for: texels, row 0 at the top, and the part's place among them.
+typedef struct {
+    int width, height;
+    float left, top, right, bottom;
+} Emission;
+
 // The light that casts them, or a part of it.
 typedef struct {
     float scale_x, scale_y, scale_d;   // from a receiver's (xi, eta, d) to tangents and disparity in the light's half extents
@@ -54,7 +60,7 @@ typedef struct {
     float bias_x, bias_y;              // self-shadow: a caster's disparity steps count for this far in x and y; 0 for triangles
     float precision;                   // of receiver depth, relative
     float position_error;              // of receivers in light space beside their own rounding, in half extents
-    float share;                       // what the part's visibility counts for in the whole light's
+    float share[3];                    // what the part's visibility counts for in the whole light's, for each channel
     int sheets;
     int overlap;                       // 0 sum, 1 max, 2 half_min, 3 product
     int culling;                       // 0 none, 1 loose, 2 tight
