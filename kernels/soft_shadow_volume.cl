@@ -145,6 +145,10 @@ inline float2 before_light(const float az, const float bz)
 // The share beyond edge number `index` in each channel of the light. `data`: what the coverage keeps beside the edges.
 inline void shares_beyond(floatn* shares, const Edge edge, const int index, const Receivers p, __global const float* data, const int size)
 {
+    // What this coverage does without.
+    (void)index;
+    (void)data;
+    (void)size;
 #if COVERAGE == 0
     shares[0] = share_by_planes(edge, data + index * WEDGE_PLANES, p);
 #elif COVERAGE == 1
@@ -332,10 +336,12 @@ inline floatn joined(const floatn before, const floatn sheet, const int overlap)
 
 inline void write_visibility(__global float* to, const floatn seen, const int left, const int add)
 {
-    if (left >= LANES && CHANNELS == 1) {
+#if CHANNELS == 1
+    if (left >= LANES) {
         store_lanes(add ? load_lanes(to) + seen : seen, to);
         return;
     }
+#endif
     float lanes[LANES];
     store_lanes(seen, lanes);
     const int count = left < LANES ? left : LANES;
