@@ -274,6 +274,23 @@ TEST(LinearWedges, CullingSparesNothingThatCounts)
         }
 }
 
+// The wedges of a sharp corner run far beyond the true penumbra: 1 / sin(10 degrees) radii here, over several tiles.
+TEST(LinearWedges, CullingKnowsHowFarCornersReach)
+{
+    const TriangleMesh needle = polygon({{-1.5f, -0.26f, -4}, {1.5f, 0, -4}, {-1.5f, 0.26f, -4}});
+    const auto mask_of = [&](WedgeCulling culling) {
+        SoftShadowVolume settings = linear;
+        settings.culling = culling;
+        return shade(sphere(0.5), needle, floor_of(256, 64, 8, {0.8, 0.2}), settings);
+    };
+    const Mask all = mask_of(WedgeCulling::none), culled = mask_of(WedgeCulling::tight);
+    EXPECT_EQ(hash_of(culled.visibility.pixels), hash_of(all.visibility.pixels));
+    // Beyond the tip (tangent 3 / 8) by thrice the penumbra's 1 / 16.
+    const int x = static_cast<int>((1 + (3.0 / 8 + 3.0 / 16) / 0.8) * 128);
+    EXPECT_LT(all.visibility.at(x, 32), 1.0f);
+    EXPECT_LT(culled.report.pairs, all.report.pairs);
+}
+
 TEST(LinearWedges, LanesGiveTheSameBits)
 {
     const auto context = device_context(true);
