@@ -31,8 +31,8 @@ struct LinearWedges {
 //     the two hard quads' normals, as it does in the limit;
 //   - a line is not there, or reaches beyond twice the corner's mitre (edges that descend so steeply that one end hides in the penumbra
 //     of the other): likewise; and where that is no better, or the corner is sharper than 2^-5 rad, each wedge ends at its own normal.
-// The share of an edge stays continuous in the receiver in all cases; what neighbours do not share appears as an error that stays along a
-// ray.
+// Neighbours that share the first kind of plane add up to a continuous share. What others do not have in common is a step along the plane:
+// nearly none between neighbours in line, up to the whole ramp where each ends at its own normal (`unshared`; corner wedges are the cure).
 //
 // An edge is left out where rounding decides about its normal: it points at the light's centre (8). Its neighbours then meet as above.
 //
