@@ -5,16 +5,18 @@
 
 namespace penumbra::bench {
 
-void bunny(const Engine& engine);        // accuracy and time beside Embree's, at several map resolutions and ray counts
-void resolution(const Engine& engine);   // Fig. 17: error over the occluder map's resolution
-void light_size(const Engine& engine);   // Figs. 18 and 24: error and time over the light's size
-void lateral(const Engine& engine);      // Fig. 19: error as the occluder moves sideways
-void vertical(const Engine& engine);     // Fig. 20: error as the occluder moves from the receiver to the light
-void texels(const Engine& engine);       // Fig. 22: time over the number of occluder texels
-void accumulators(const Engine& engine); // Fig. 14, Appendix A: binary16, binary32, compensated
-void baselines(const Engine& engine);    // shadow maps: hard, percentage-closer, bicubic
-void large(const Engine& engine);        // 4096 x 4096 receivers, 2048 x 2048 occluders
-void image_io(const Engine& engine);     // images from and to bytes beside OpenImageIO
-void limits(const Engine& engine);       // the device's arithmetic and memory limits, and what the inner loop reaches
+void bunny(const Engine& engine);         // accuracy and time beside Embree's, at several map resolutions and ray counts
+void resolution(const Engine& engine);    // Fig. 17: error over the occluder map's resolution
+void light_size(const Engine& engine);    // Figs. 18 and 24: error and time over the light's size
+void lateral(const Engine& engine);       // Fig. 19: error as the occluder moves sideways
+void vertical(const Engine& engine);      // Fig. 20: error as the occluder moves from the receiver to the light
+void texels(const Engine& engine);        // Fig. 22: time over the number of occluder texels
+void accumulators(const Engine& engine);  // Fig. 14, Appendix A: binary16, binary32, compensated
+void baselines(const Engine& engine);     // shadow maps: hard, percentage-closer, bicubic
+void large(const Engine& engine);         // 4096 x 4096 receivers, 2048 x 2048 occluders
+void wedges(const Engine& engine);        // soft_shadow_volume: overlap, splits, spheres, beside rays
+void wedge_culling(const Engine& engine); // what each culling spares; the light's size
+void image_io(const Engine& engine);      // images from and to bytes beside OpenImageIO
+void limits(const Engine& engine);        // the device's arithmetic and memory limits, and what the inner loop reaches
 
 } // namespace penumbra::bench

@@ -27,6 +27,8 @@ constexpr Case cases[] = {
     {"accumulators", accumulators, "binary16, binary32, compensated (Fig. 14, Appendix A)"},
     {"baselines", baselines, "shadow maps: hard, percentage-closer, bicubic"},
     {"large", large, "4096 x 4096 receivers, 2048 x 2048 occluders"},
+    {"wedges", wedges, "soft_shadow_volume: overlap, light splits, spheres, beside Embree's"},
+    {"wedge_culling", wedge_culling, "soft_shadow_volume: what each culling spares (Papers II and IV); the light's size"},
     {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},
 };

@@ -1,0 +1,72 @@
+// soft_shadow_volume: error and cost of its settings beside shadow rays of the same run.
+#include "cases.hpp"
+#include "rows.hpp"
+#include "scenes.hpp"
+
+namespace penumbra::bench {
+namespace {
+
+void emit(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, const char* bench, double parameter,
+          int runs)
+{
+    Row row = measure(engine, scene, technique, reference, runs);
+    row.bench = bench;
+    row.scene = name(Occluder::bunny);
+    row.parameter = parameter;
+    print(row);
+}
+
+void rays(const Engine& engine, const Scene& scene, const Image& reference, const char* bench)
+{
+    for (const bool adaptive : {false, true})
+        for (const int samples : {4, 16, 64, 256, 1024}) {
+            const RayTraced settings{.samples = samples, .adaptive = adaptive, .first_samples = 16, .seed = 1};
+            if (!adaptive || samples > 16) emit(engine, scene, settings, reference, bench, samples, 3);
+        }
+}
+
+// The receivers of a scene as a camera beside the light sees them.
+Scene from_aside(Scene scene)
+{
+    const double s = 0.6, c = 0.8; // looks 53 degrees down, towards -z
+    scene.receivers.camera =
+        PinholeCamera{.frame = {.origin = {0, 8, 6}, .x = {1, 0, 0}, .y = {0, s, -c}, .z = {0, c, s}}, .tan_half_fov = {0.45, 0.45}};
+    return scene;
+}
+
+} // namespace
+
+void wedges(const Engine& engine)
+{
+    const Scene scene = paper_scene(Occluder::bunny, {});
+    const Image reference = reference_of(engine, scene, 4096);
+    for (const Overlap overlap : {Overlap::sum, Overlap::max, Overlap::half_min, Overlap::product})
+        emit(engine, scene, SoftShadowVolume{.overlap = overlap}, reference, "wedges", 1, 15);
+    for (const int splits : {2, 3, 4, 8}) emit(engine, scene, SoftShadowVolume{.light_splits = splits}, reference, "wedges", splits, 9);
+    rays(engine, scene, reference, "wedges");
+
+    // The same light as a sphere of its inscribed circle.
+    Scene ball = scene;
+    const RectangleLight& rectangle = std::get<RectangleLight>(scene.light);
+    ball.light = SphereLight{.center = rectangle.center, .radius = rectangle.half_u.length(), .direction = {0, -1, 0}, .up = {}};
+    const Image ball_reference = reference_of(engine, ball, 4096);
+    for (const Coverage coverage : {Coverage::analytic, Coverage::linear})
+        emit(engine, ball, SoftShadowVolume{.coverage = coverage}, ball_reference, "wedges_sphere", 1, 9);
+    rays(engine, ball, ball_reference, "wedges_sphere");
+}
+
+void wedge_culling(const Engine& engine)
+{
+    const Scene scene = from_aside(paper_scene(Occluder::bunny, {}));
+    const Image reference = reference_of(engine, scene, 256);
+    for (const WedgeCulling culling : {WedgeCulling::tight, WedgeCulling::loose, WedgeCulling::far_depth, WedgeCulling::none})
+        emit(engine, scene, SoftShadowVolume{.culling = culling}, reference, "wedge_culling", static_cast<double>(culling),
+             culling == WedgeCulling::none ? 1 : 9);
+    for (const double side : {0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0}) {
+        const Scene at = paper_scene(Occluder::bunny, {.light_side = side});
+        const Image seen = reference_of(engine, at, 1024);
+        emit(engine, at, SoftShadowVolume{}, seen, "wedge_light_size", side, 9);
+    }
+}
+
+} // namespace penumbra::bench
