@@ -10,7 +10,7 @@ echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | 
 printf '%s\n' "$rows" | awk -F, '
     # Settings that are at their defaults say nothing.
     { s = " " $4 " "
-      n = split("resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
+      n = split("coverage=analytic overlap=sum table=32 lookup=quadrilinear buffer=binary32 culling=tight smooth=false corner_wedges=0 resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       gsub(/^ +| +$/, "", s)
