@@ -71,7 +71,7 @@ ordered_json write_camera(const CameraSpec& spec, int width, int height)
 ordered_json write_technique(const TechniqueRequest& request)
 {
     ordered_json json{{"kind", request.kind}};
-    for (const auto& [name, value] : request.settings) std::visit([&](const auto& v) { json[name] = v; }, value);
+    for (const auto& setting : request.settings) std::visit([&](const auto& value) { json[setting.first] = value; }, setting.second);
     return json;
 }
 
