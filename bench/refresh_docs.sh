@@ -1,9 +1,11 @@
 #!/bin/sh
 # Writes the tables of docs/*.md anew. A table stands between "<!-- table: COMMAND -->" and "<!-- end -->" and is what COMMAND prints.
+#     bench/refresh_docs.sh [PAGE...]      all pages without arguments
 # Run bench/run.sh first.
 set -eu
 cd "$(dirname "$0")/.."
-for page in docs/*.md; do
+[ $# -gt 0 ] || set -- docs/*.md
+for page in "$@"; do
     awk '
         /^<!-- table: .* -->$/ {
             print

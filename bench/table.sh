@@ -3,6 +3,7 @@
 set -eu
 file=$1
 shift
+[ -r "$file" ] || { echo "bench/table.sh: $file is missing: run bench/run.sh" >&2; exit 1; }
 rows=$(grep -v '^#' "$file" | tail -n +2)
 for pattern in "$@"; do rows=$(printf '%s\n' "$rows" | grep -e "$pattern"); done
 echo '| technique | settings | parameter | MAE shadow | RMSE shadow | bias | largest | 99 % | prepare ms | shade ms min / median / max | kernel ms | pairs or rays a second | MiB on device |'
@@ -10,7 +11,7 @@ echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | 
 printf '%s\n' "$rows" | awk -F, '
     # Settings that are at their defaults say nothing.
     { s = " " $4 " "
-      n = split("coverage=analytic overlap=sum table=32 lookup=quadrilinear buffer=binary32 culling=tight smooth=false corner_wedges=0 resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
+      n = split("coverage=analytic overlap=sum light_splits=1 table=32 lookup=quadrilinear buffer=binary32 culling=tight smooth=false corner_wedges=0 resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       gsub(/^ +| +$/, "", s)
