@@ -49,7 +49,8 @@ const std::array rows{
     OptionRow{"receivers", "pixels", "largest mask, width x height", {1, giga}, &Options::receivers},
     OptionRow{"pairs",
               "pairs",
-              "most pairs of occluder texel and receiver that soft_shadow_map may have to look at",
+              "most pairs of occluder texel and receiver that soft_shadow_map may have to look at; soft_shadow_volume counts as 4096 a "
+              "receiver and part of the light",
               {1, std::int64_t{1} << 60},
               &Options::pairs},
     OptionRow{"rays", "rays", "most rays of ray_traced: samples x receivers", {1, std::int64_t{1} << 60}, &Options::rays},

@@ -47,7 +47,14 @@ struct WorkCheck {
         const double points = settings.project ? static_cast<double>(settings.project_resolution) * settings.project_resolution : pixels();
         check_amount("receivers.resolution", texels * points, "pairs of occluder texel and receiver", options.pairs);
     }
-    void operator()(const SoftShadowVolume&) const {}
+    // How many edges and triangles a receiver meets is known when silhouettes are; this many are taken for granted.
+    void operator()(const SoftShadowVolume& settings) const
+    {
+        constexpr double met = 4096;
+        const double parts = static_cast<double>(settings.light_splits) * settings.light_splits;
+        check_amount("technique.light_splits", parts * pixels() * met, "pairs of edge and receiver, at 4096 edges a receiver and part",
+                     options.pairs);
+    }
     void operator()(const RayTraced& settings) const
     {
         check_amount("technique.samples", pixels() * settings.samples, "rays", options.rays);

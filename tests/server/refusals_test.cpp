@@ -110,6 +110,10 @@ TEST(Refusals, OfWorkThatIsTooMuch)
     expect_problem(ask(small.port, post(form(parts()))), 413, "1023", "receivers");
     Running few{server::Options{.device = {}, .token = {}, .pairs = side * side * side * side - 1}};
     expect_problem(ask(few.port, post(form(parts()))), 413, "receivers.resolution", "pairs");
+    // 32 x 32 receivers and 4 x 4 parts at 4096 each are 2^26 pairs; the limit is 2^20 - 1.
+    nlohmann::json split = scene_json();
+    split["technique"] = {{"kind", "soft_shadow_volume"}, {"light_splits", 4}};
+    expect_problem(ask(few.port, post(form(parts(split)))), 413, "technique.light_splits", "pairs");
     nlohmann::json rays = scene_json();
     rays["technique"] = {{"kind", "ray_traced"}, {"samples", 65536}};
     Running dim{server::Options{.device = {}, .token = {}, .rays = side * side}};
