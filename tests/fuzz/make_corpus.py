@@ -26,7 +26,8 @@ def put(target, name, data):
 def oiiotool(target, name, *arguments):
     folder = CORPUS / target
     folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run(["oiiotool", *map(str, arguments), "-o", str(folder / name)], check=True, capture_output=True)
+    # From the folder itself: oiiotool writes its command line into the file, and no path of the machine is to stand there.
+    subprocess.run(["oiiotool", *map(str, arguments), "-o", name], check=True, capture_output=True, cwd=folder)
 
 
 # --- EXR, TIFF, HDR through OpenImageIO
