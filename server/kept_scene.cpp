@@ -142,7 +142,6 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
         // Seen from the light, or fitted by it, the receivers depend on it.
         if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
             task.receivers_key += '\n' + changes.text("light");
-        return 0;
     });
     return task;
 }

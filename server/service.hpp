@@ -20,7 +20,6 @@
 namespace httplib {
 struct Request;
 struct Response;
-class ContentReader;
 } // namespace httplib
 
 namespace penumbra::server {
@@ -51,7 +50,6 @@ private:
     class Http;
     using Request = httplib::Request;
     using Response = httplib::Response;
-    using Reader = httplib::ContentReader;
 
     // service_checks.cpp: throw Problem for what is refused before its body is read.
     void check(const Request& request) const;
@@ -61,9 +59,9 @@ private:
 
     // service_masks.cpp: what computes.
     Body read_body(const Request& request) const;
-    void post_mask(const Request& request, Response& response, const Reader& reader);
-    void post_scene(const Request& request, Response& response, const Reader& reader);
-    void post_kept_mask(const Request& request, Response& response, const Reader& reader);
+    void post_mask(const Request& request, Response& response);
+    void post_scene(const Request& request, Response& response);
+    void post_kept_mask(const Request& request, Response& response);
     void get_scene(const Request& request, Response& response);
     void delete_scene(const Request& request, Response& response);
     Gate::Guard enter_slot();

@@ -89,7 +89,7 @@ Gate::Guard Service::enter_slot()
     return slot;
 }
 
-void Service::post_mask(const Request& request, Response& response, const Reader&)
+void Service::post_mask(const Request& request, Response& response)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
@@ -107,13 +107,13 @@ void Service::post_mask(const Request& request, Response& response, const Reader
     tag.set_on(response);
 }
 
-void Service::post_scene(const Request& request, Response& response, const Reader&)
+void Service::post_scene(const Request& request, Response& response)
 {
+    if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const Body body = read_body(request);
     const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
-    if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
     const std::string id = id_of(parts);
     auto scene = scenes_.find(id, true);
     response.status = scene ? 200 : 201;
@@ -131,7 +131,7 @@ void Service::post_scene(const Request& request, Response& response, const Reade
     response.set_content(describe(*scene), "application/json");
 }
 
-void Service::post_kept_mask(const Request& request, Response& response, const Reader&)
+void Service::post_kept_mask(const Request& request, Response& response)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();

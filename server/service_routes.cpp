@@ -68,10 +68,11 @@ void Service::set_routes()
         if (!response.has_header("Cache-Control")) response.set_header("Cache-Control", "no-store");
     });
 
-    using Handler = void (Service::*)(const Request&, Response&, const Reader&);
+    // With a reader in its signature, so that the library leaves the body to read_body().
+    using Handler = void (Service::*)(const Request&, Response&);
     const auto post = [this](const char* path, Handler handler) {
-        http_->Post(path, [this, handler](const Request& request, Response& response, const Reader& reader) {
-            guarded(response, [&] { (this->*handler)(request, response, reader); });
+        http_->Post(path, [this, handler](const Request& request, Response& response, const httplib::ContentReader&) {
+            guarded(response, [&] { (this->*handler)(request, response); });
         });
     };
     post("/v1/masks", &Service::post_mask);

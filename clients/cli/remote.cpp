@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <limits>
 #include <span>
 #include <system_error>
 
@@ -15,6 +14,7 @@
 #include "io/image_format.hpp"
 #include "io/image_io.hpp"
 #include "io/json_value.hpp"
+#include "io/scene_parts.hpp"
 #include "progress.hpp"
 #include "streams.hpp"
 
@@ -40,27 +40,12 @@ client::Format format_of_mask(const std::string& path)
     }
 }
 
-SettingValue setting_from(const JsonValue& value)
-{
-    const nlohmann::json& json = value.json();
-    if (json.is_boolean()) return json.get<bool>();
-    if (json.is_number_integer()) return value.integer(std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max());
-    if (json.is_number()) return value.number();
-    if (json.is_string()) return value.text();
-    throw value.expected("true, false, a number or a string");
-}
-
 // The scene's technique with the flags applied; without flags it stays as it is, for the service to judge.
 void apply_flags(nlohmann::json& scene, const TechniqueFlags& flags)
 {
     if (flags.kind.empty() && flags.settings.empty()) return;
     TechniqueRequest request;
-    if (const auto technique = JsonObject(JsonValue(scene, {})).find("technique")) {
-        const JsonObject section(*technique);
-        request.kind = section.need("kind").text();
-        for (const auto& [name, value] : section.members())
-            if (name != "kind") request.settings.emplace_back(name, setting_from(value));
-    }
+    if (const auto technique = JsonObject(JsonValue(scene, {})).find("technique")) request = parse_technique(*technique);
     request = apply(std::move(request), flags);
     nlohmann::json& technique = scene["technique"] = {{"kind", request.kind}};
     for (const auto& [name, value] : request.settings) std::visit([&](const auto& held) { technique[name] = held; }, value);

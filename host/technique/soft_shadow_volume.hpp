@@ -16,7 +16,7 @@ struct PreparedSoftShadowVolume {
     struct Part {
         WedgeLight light{};
         opencl::Buffer<Sheet> sheets;
-        opencl::Buffer<float> coverage; // the table of a textured light
+        opencl::Buffer<float> coverage; // texture: the table; linear: the planes of wedges; else none
         opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes, triangle_extents, triangles;
     };
     SoftShadowVolume settings;
@@ -41,7 +41,7 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
 Camera wedge_view(const Light& light);
 
 // Writes visibility, receivers.view.height x receivers.view.width x prepared.channels. With `counts` it waits for the device to fill them
-// in. `eye`: the receivers' camera in light space, in scene units.
+// in.
 void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const ReceiverPoints& receivers,
                               const cl::Buffer& visibility, ShadeCounts* counts);
 
