@@ -48,67 +48,7 @@ inline intn left_of(const floatn ax, const floatn ay, const floatn bx, const flo
     return left;
 }
 
-// --- Culling ----------------------------------------------------------------------------------------------------------------------------
-
-// A tile of receivers: tangents within [x0, x1] x [y0, y1], none further than disparity d; the light reaches `reach` half extents from its centre there.
-typedef struct {
-    float x0, x1, y0, y1, d;
-    float2 reach;
-} Tile;
-
-// 16 boxes of points (x / z, y / z, 1 / z): five rows of 16 floats, low x, high x, low y, high y, high 1 / z. All ones where the penumbra of something in the box
-// can meet the tile: a point casts its penumbra on receivers with |x / z - t| <= reach (1 / z - d). Widened by 2^-18 for the rounding of this test and of
-// what it spares.
-// With `use_reach` 0 for the line to the light's centre alone, as triangles are counted.
-inline int16 boxes_meet(const Tile tile, __global const float* boxes, const float use_reach)
-{
-    const float16 x0 = vload16(0, boxes), x1 = vload16(1, boxes), y0 = vload16(2, boxes), y1 = vload16(3, boxes), near = vload16(4, boxes);
-    const float16 rise = (near - tile.d) + 0x1p-18f * near;
-    const float16 margin_x = 0x1p-18f * (fabs(x0) + fabs(x1)), margin_y = 0x1p-18f * (fabs(y0) + fabs(y1));
-    const float16 ex = rise * (tile.reach.x * use_reach) + margin_x, ey = rise * (tile.reach.y * use_reach) + margin_y;
-    return (near >= tile.d) & (x1 + ex >= tile.x0) & (x0 - ex <= tile.x1) & (y1 + ey >= tile.y0) & (y0 - ey <= tile.y1);
-}
-
-// The same for 16 edges, by the wedge's own shape: six rows of 16, both ends' x / z, y / z, 1 / z. With `loose`, the wedge of Paper III, 3.1: both ends are
-// taken at the nearer one's distance, and the light as its bounding sphere (host: tile.reach).
-inline int16 edges_meet(const Tile tile, __global const float* ends, const int loose)
-{
-    const float16 ax = vload16(0, ends), ay = vload16(1, ends), ad = vload16(2, ends);
-    const float16 bx = vload16(3, ends), by = vload16(4, ends), bd = vload16(5, ends);
-    const float16 near = select(ad, bd, bd > ad), zero = (float16)(0.0f);
-    const float16 margin = 0x1p-18f * (near + fabs(ax) + fabs(bx) + fabs(ay) + fabs(by));
-    // How far the penumbra of either end reaches on the tile's furthest receivers.
-    const float16 a_rise = select(zero, (loose ? near : ad) - tile.d, ad > tile.d || loose), b_rise = select(zero, (loose ? near : bd) - tile.d, bd > tile.d || loose);
-    const float16 a_ex = a_rise * tile.reach.x + margin, b_ex = b_rise * tile.reach.x + margin, a_ey = a_rise * tile.reach.y + margin, b_ey = b_rise * tile.reach.y + margin;
-    int16 meet = (near >= tile.d) & ((ax + a_ex >= tile.x0) | (bx + b_ex >= tile.x0)) & ((ax - a_ex <= tile.x1) | (bx - b_ex <= tile.x1)) &
-                 ((ay + a_ey >= tile.y0) | (by + b_ey >= tile.y0)) & ((ay - a_ey <= tile.y1) | (by - b_ey <= tile.y1));
-    // Across the edge: the tile's middle must not be further from its line than the tile and the penumbra are wide.
-    const float16 nx = by - ay, ny = ax - bx;
-    const float mx = 0.5f * (tile.x0 + tile.x1), my = 0.5f * (tile.y0 + tile.y1), wx = 0.5f * (tile.x1 - tile.x0), wy = 0.5f * (tile.y1 - tile.y0);
-    const float16 far = fabs(nx * (mx - ax) + ny * (my - ay));
-    const float16 ex = select(a_ex, b_ex, b_ex > a_ex), ey = select(a_ey, b_ey, b_ey > a_ey);
-    meet &= far <= (fabs(nx) * (wx + ex) + fabs(ny) * (wy + ey)) * (1.0f + 0x1p-18f);
-    return meet;
-}
-
-// Which of 16 comparisons hold, as bits.
-inline uint bits_of(const int16 yes)
-{
-    const uint16 weights = (uint16)(1u, 2u, 4u, 8u, 16u, 32u, 64u, 128u, 256u, 512u, 1024u, 2048u, 4096u, 8192u, 16384u, 32768u);
-    const uint16 w = as_uint16(yes) & weights;
-    const uint8 a = w.lo | w.hi;
-    const uint4 b = a.lo | a.hi;
-    const uint2 c = b.lo | b.hi;
-    return c.x | c.y;
-}
-
-// The lowest bit's number; it is taken off.
-inline int take_bit(uint* bits)
-{
-    const int first = 31 - (int)clz(*bits & (0u - *bits));
-    *bits &= *bits - 1u;
-    return first;
-}
+#include "common/wedge_culling.clh"
 
 // --- The share of the light beyond an edge ----------------------------------------------------------------------------------------------
 
@@ -158,81 +98,7 @@ inline void shares_beyond(floatn* shares, const Edge edge, const int index, cons
 #endif
 }
 
-// --- Accumulators -----------------------------------------------------------------------------------------------------------------------
-
-// A receiver's occlusion by one sheet, in the buffer that ACCUMULATOR says.
-#if ACCUMULATOR == 0
-
-typedef struct {
-    floatn sum;
-} Sum;
-inline void clear(Sum* s) { s->sum = (floatn)(0.0f); }
-inline void add_hard(Sum* s, const intn behind) { s->sum += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
-inline void add_share(Sum* s, const floatn share) { s->sum -= share; }
-inline floatn occlusion_of(const Sum* s) { return s->sum; }
-
-#elif ACCUMULATOR == 1
-
-// Paper I, section 4: shares times 255, rounded, in a signed 16-bit buffer, which holds what it can.
-typedef struct {
-    floatn sum;
-} Sum;
-inline void clear(Sum* s) { s->sum = (floatn)(0.0f); }
-inline void add(Sum* s, const floatn levels) { s->sum = clamp(s->sum + levels, (floatn)(-32768.0f), (floatn)(32767.0f)); }
-inline void add_hard(Sum* s, const intn behind) { add(s, select_lanes((floatn)(0.0f), (floatn)(255.0f), behind)); }
-inline void add_share(Sum* s, const floatn share) { add(s, -rint(share * 255.0f)); }
-inline floatn occlusion_of(const Sum* s) { return s->sum * (1.0f / 255.0f); }
-
-#elif ACCUMULATOR == 2
-
-// Paper III, 4.2: 64 levels; what adds and what subtracts has an 8-bit channel each, so that two bits are left for overlap. Hard shadows: the stencil buffer.
-typedef struct {
-    floatn hard, more, less;
-} Sum;
-inline void clear(Sum* s) { s->hard = s->more = s->less = (floatn)(0.0f); }
-inline void add_hard(Sum* s, const intn behind) { s->hard += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
-inline void add_share(Sum* s, const floatn share)
-{
-    const floatn level = rint(share * 63.0f), zero = (floatn)(0.0f), most = (floatn)(255.0f);
-    s->more = clamp(s->more + select_lanes(zero, -level, level < zero), zero, most);
-    s->less = clamp(s->less + select_lanes(zero, level, level > zero), zero, most);
-}
-inline floatn occlusion_of(const Sum* s) { return s->hard + (s->more - s->less) * (1.0f / 63.0f); }
-
-#else
-
-// Paper IV, 4.3: twelve bits, three in each of four 8-bit channels, the upper five left for overlap; a buffer each for what adds and what subtracts.
-typedef struct {
-    floatn hard, more[4], less[4];
-} Sum;
-inline void clear(Sum* s)
-{
-    s->hard = (floatn)(0.0f);
-    for (int i = 0; i < 4; ++i) s->more[i] = s->less[i] = (floatn)(0.0f);
-}
-inline void add_hard(Sum* s, const intn behind) { s->hard += select_lanes((floatn)(0.0f), (floatn)(1.0f), behind); }
-inline void add_share(Sum* s, const floatn share)
-{
-    const floatn zero = (floatn)(0.0f), most = (floatn)(255.0f);
-    floatn level = rint(fabs(share) * 4095.0f);
-    for (int i = 0; i < 4; ++i) {
-        const floatn higher = floor(level * 0.125f), digit = level - higher * 8.0f;
-        s->more[i] = clamp(s->more[i] + select_lanes(zero, digit, share < zero), zero, most);
-        s->less[i] = clamp(s->less[i] + select_lanes(zero, digit, share > zero), zero, most);
-        level = higher;
-    }
-}
-inline floatn occlusion_of(const Sum* s)
-{
-    floatn levels = (floatn)(0.0f), weight = (floatn)(1.0f);
-    for (int i = 0; i < 4; ++i) {
-        levels += (s->more[i] - s->less[i]) * weight;
-        weight *= 8.0f;
-    }
-    return s->hard + levels * (1.0f / 4095.0f);
-}
-
-#endif
+#include "common/wedge_buffers.clh"
 
 // --- Shading ------------------------------------------------------------------------------------------------------------------------------
 
