@@ -43,7 +43,7 @@ inline intn left_of(const floatn ax, const floatn ay, const floatn bx, const flo
 #if LANES == 1
     if (on) left = ay > by || (ay == by && bx > ax);
 #else
-    if (any(on)) left |= on & ((ay > by) | ((ay == by) & (bx > ax)));
+    if (!NONE(on)) left |= on & ((ay > by) | ((ay == by) & (bx > ax)));
 #endif
     return left;
 }
@@ -83,7 +83,7 @@ inline float2 before_light(const float az, const float bz)
 #endif
 
 // The share beyond edge number `index` in each channel of the light. `data`: what the coverage keeps beside the edges.
-inline void shares_beyond(floatn* shares, const Edge edge, const int index, const Receivers p, __global const float* data, const int size)
+__attribute__((always_inline)) inline void shares_beyond(floatn* shares, const Edge edge, const int index, const Receivers p, __global const float* data, const int size)
 {
     // What this coverage does without.
     (void)index;
@@ -102,7 +102,7 @@ inline void shares_beyond(floatn* shares, const Edge edge, const int index, cons
 
 // --- Shading ------------------------------------------------------------------------------------------------------------------------------
 
-inline Receivers receivers_at(const WedgeLight light, const int stride, __global const float* xi, __global const float* eta, __global const float* d,
+__attribute__((always_inline)) inline Receivers receivers_at(const WedgeLight light, const int stride, __global const float* xi, __global const float* eta, __global const float* d,
                               const int x, const int y)
 {
     const int at = y * stride + x;
@@ -116,7 +116,7 @@ inline Receivers receivers_at(const WedgeLight light, const int stride, __global
 
 // Where a triangle lies between the receivers and the light's centre. Row of 16 floats: the vertices a, b, c in order of their numbers; the plane's disparity
 // 1 / z = n.x t.x + n.y t.y + n.z; 1 where a, b, c turn counter-clockwise, seen from the light, else -1.
-inline intn behind_triangle(__global const float* triangle, const WedgeLight light, const Receivers p)
+__attribute__((always_inline)) inline intn behind_triangle(__global const float* triangle, const WedgeLight light, const Receivers p)
 {
     const float nx = triangle[9], ny = triangle[10], nz = triangle[11];
     // Nearer to the light than the receiver by more than rounding and bias explain: of the plane's three terms, of the receiver's place, and of its depth.

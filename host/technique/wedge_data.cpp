@@ -11,26 +11,36 @@ namespace {
 constexpr std::size_t group_size = WEDGE_GROUP;
 constexpr double everywhere = 1e18; // beyond any tangent and disparity that a box is compared with
 
-// A box of points (x / z, y / z, 1 / z).
+// Where a point is for culling: (x / z, y / z, 1 / z). At or behind the light's plane it has no place: near is negative.
+struct Place {
+    double x = 0, y = 0, near = -1;
+};
+
+Place place_of(const Vec3& point)
+{
+    if (!(point.z > 0)) return {};
+    return {.x = std::clamp(point.x / point.z, -everywhere, everywhere),
+            .y = std::clamp(point.y / point.z, -everywhere, everywhere),
+            .near = std::min(1 / point.z, everywhere)};
+}
+
+// A box of places.
 struct Box {
     std::array<double, 2> low{everywhere, everywhere}, high{-everywhere, -everywhere};
     double near = -1;
 
-    void add(const Vec3& point)
+    void add(const Place& place)
     {
-        // At or behind the light's plane a point has no place in this space: its penumbra may be anywhere.
-        if (!(point.z > 0)) {
+        // Without a place: its penumbra may be anywhere.
+        if (place.near < 0) {
             low = {-everywhere, -everywhere};
             high = {everywhere, everywhere};
             near = everywhere;
             return;
         }
-        for (int axis = 0; axis < 2; ++axis) {
-            const std::size_t i = static_cast<std::size_t>(axis);
-            low[i] = std::min(low[i], std::max(point[axis] / point.z, -everywhere));
-            high[i] = std::max(high[i], std::min(point[axis] / point.z, everywhere));
-        }
-        near = std::max(near, std::min(1 / point.z, everywhere));
+        low = {std::min(low[0], place.x), std::min(low[1], place.y)};
+        high = {std::max(high[0], place.x), std::max(high[1], place.y)};
+        near = std::max(near, place.near);
     }
     void add(const Box& other)
     {
@@ -42,19 +52,21 @@ struct Box {
     }
 };
 
+void write_box(float* block, const Box& box)
+{
+    block[0] = static_cast<float>(box.low[0]);
+    block[16] = static_cast<float>(box.high[0]);
+    block[32] = static_cast<float>(box.low[1]);
+    block[48] = static_cast<float>(box.high[1]);
+    block[64] = static_cast<float>(box.near);
+}
+
 // Boxes as blocks of 16: low x, high x, low y, high y, near. What pads the last block meets nothing.
 std::vector<float> blocks(const std::vector<Box>& boxes)
 {
     const std::size_t count = (boxes.size() + 15) / 16;
     std::vector<float> floats(std::max<std::size_t>(count, 1) * 80, -1.0F);
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-        float* const block = floats.data() + i / 16 * 80 + i % 16;
-        block[0] = static_cast<float>(boxes[i].low[0]);
-        block[16] = static_cast<float>(boxes[i].high[0]);
-        block[32] = static_cast<float>(boxes[i].low[1]);
-        block[48] = static_cast<float>(boxes[i].high[1]);
-        block[64] = static_cast<float>(boxes[i].near);
-    }
+    for (std::size_t i = 0; i < boxes.size(); ++i) write_box(floats.data() + i / 16 * 80 + i % 16, boxes[i]);
     return floats;
 }
 
@@ -63,7 +75,11 @@ public:
     Builder(const Topology& topology, const LightFrame& light, const LightPart& part) : any_plane_(light.shape == LightShape::disc)
     {
         points_.reserve(topology.vertices().size());
-        for (const Imath::V3f& vertex : topology.vertices()) points_.push_back(point_in_part(light, part, Vec3(vertex)));
+        places_.reserve(topology.vertices().size());
+        for (const Imath::V3f& vertex : topology.vertices()) {
+            points_.push_back(point_in_part(light, part, Vec3(vertex)));
+            places_.push_back(place_of(points_.back()));
+        }
     }
 
     void begin_sheet()
@@ -100,6 +116,9 @@ public:
             if (counts(triangle[0]) || counts(triangle[1]) || counts(triangle[2])) counted.push_back(triangle);
         data_.triangle_count += counted.size();
         sort_by_place(counted);
+        const std::size_t groups = (counted.size() + group_size - 1) / group_size;
+        data_.triangles.reserve(data_.triangles.size() + 16 * group_size * groups);
+        data_.triangle_extents.reserve(data_.triangle_extents.size() + 5 * group_size * groups);
         for (std::size_t first = 0; first < counted.size(); first += group_size)
             add_triangle_group(std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
     }
@@ -120,28 +139,26 @@ private:
     {
         Box all;
         for (const auto& triangle : triangles)
-            if (points_[triangle[0]].z > 0) all.add(points_[triangle[0]]);
-        std::vector<std::pair<std::uint32_t, std::uint32_t>> order; // code, triangle
-        const auto spread = [](std::uint32_t v) {
+            if (places_[triangle[0]].near > 0) all.add(places_[triangle[0]]);
+        const auto cell = [](double value, double low, double high) {
+            const double place = high > low ? (value - low) / (high - low) : 0;
+            std::uint32_t v = static_cast<std::uint32_t>(std::clamp(place, 0.0, 1.0) * 65535);
             v = (v | v << 8) & 0x00ff00ffU;
             v = (v | v << 4) & 0x0f0f0f0fU;
             v = (v | v << 2) & 0x33333333U;
             return (v | v << 1) & 0x55555555U;
         };
-        const auto cell = [&](const Vec3& point, int axis) {
-            const std::size_t i = static_cast<std::size_t>(axis);
-            const double size = all.high[i] - all.low[i];
-            const double place = point.z > 0 && size > 0 ? (point[axis] / point.z - all.low[i]) / size : 0;
-            return static_cast<std::uint32_t>(std::clamp(place, 0.0, 1.0) * 65535);
-        };
+        std::vector<std::uint64_t> order; // code, then the triangle's number
+        order.reserve(triangles.size());
         for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-            const Vec3& point = points_[triangles[i][0]];
-            order.emplace_back(spread(cell(point, 0)) | spread(cell(point, 1)) << 1, i);
+            const Place& place = places_[triangles[i][0]];
+            const std::uint32_t code = cell(place.x, all.low[0], all.high[0]) | cell(place.y, all.low[1], all.high[1]) << 1;
+            order.push_back(std::uint64_t{place.near > 0 ? code : 0} << 32 | i);
         }
         std::sort(order.begin(), order.end());
         std::vector<std::array<std::uint32_t, 3>> sorted;
         sorted.reserve(triangles.size());
-        for (const auto& [code, index] : order) sorted.push_back(triangles[index]);
+        for (const std::uint64_t entry : order) sorted.push_back(triangles[entry & 0xffffffffU]);
         triangles = std::move(sorted);
     }
 
@@ -156,24 +173,25 @@ private:
         for (std::size_t i = 0; i < numbers.size(); ++i) {
             const SilhouetteEdge& edge = all[numbers[i]];
             const bool forward = edge.from < edge.to;
-            const Vec3 &a = points_[forward ? edge.from : edge.to], &b = points_[forward ? edge.to : edge.from];
+            const std::uint32_t first = forward ? edge.from : edge.to, second = forward ? edge.to : edge.from;
+            const Vec3 &a = points_[first], &b = points_[second];
             float* const row = data_.edges.data() + rows + 8 * i;
             const std::array<double, 7> values{a.x, a.y, a.z, b.x, b.y, b.z, forward ? 1.0 : -1.0};
             std::transform(values.begin(), values.end(), row, [](double value) { return static_cast<float>(value); });
 
             Box own;
-            own.add(a);
-            own.add(b);
+            own.add(places_[first]);
+            own.add(places_[second]);
             box.add(own);
             float* const end = data_.edge_ends.data() + ends + i;
             const bool unbounded = own.near >= everywhere;
-            const auto place = [&](const Vec3& point, std::size_t first) {
-                end[(first + 0) * 16] = unbounded ? 0.0F : static_cast<float>(point.x / point.z);
-                end[(first + 1) * 16] = unbounded ? 0.0F : static_cast<float>(point.y / point.z);
-                end[(first + 2) * 16] = static_cast<float>(unbounded ? everywhere : 1 / point.z);
+            const auto write_end = [&](const Place& place, std::size_t at) {
+                end[(at + 0) * 16] = unbounded ? 0.0F : static_cast<float>(place.x);
+                end[(at + 1) * 16] = unbounded ? 0.0F : static_cast<float>(place.y);
+                end[(at + 2) * 16] = static_cast<float>(unbounded ? everywhere : place.near);
             };
-            place(a, 0);
-            place(b, 3);
+            write_end(places_[first], 0);
+            write_end(places_[second], 3);
         }
         edge_groups_.push_back(box);
         sheet_box_.add(box);
@@ -183,7 +201,8 @@ private:
     {
         const std::size_t rows = data_.triangles.size();
         data_.triangles.resize(rows + 16 * group_size, 0.0F); // a plane of disparity 0 is before nothing
-        std::vector<Box> boxes;
+        const std::size_t extents = data_.triangle_extents.size();
+        data_.triangle_extents.resize(extents + 5 * group_size, -1.0F);
         Box box;
         for (std::size_t i = 0; i < triangles.size(); ++i) {
             std::array<std::uint32_t, 3> order = triangles[i];
@@ -201,10 +220,8 @@ private:
             const Vec3 &a = points_[order[0]], &b = points_[order[1]], &c = points_[order[2]];
             const Vec3 normal = (b - a).cross(c - a), plane = normal / normal.dot(a);
             Box own;
-            own.add(a);
-            own.add(b);
-            own.add(c);
-            boxes.push_back(own);
+            for (const std::uint32_t vertex : order) own.add(places_[vertex]);
+            write_box(data_.triangle_extents.data() + extents + i, own);
             box.add(own);
             // Edge-on to the light's centre it covers nothing.
             const bool flat = !(std::abs(plane.x) < everywhere && std::abs(plane.y) < everywhere && std::abs(plane.z) < everywhere);
@@ -224,14 +241,13 @@ private:
             std::transform(values.begin(), values.end(), data_.triangles.data() + rows + 16 * i,
                            [](double value) { return static_cast<float>(value); });
         }
-        const std::vector<float> extents = blocks(boxes);
-        data_.triangle_extents.insert(data_.triangle_extents.end(), extents.begin(), extents.end());
         triangle_groups_.push_back(box);
         sheet_box_.add(box);
     }
 
     const bool any_plane_;
     std::vector<Vec3> points_;
+    std::vector<Place> places_;
     WedgeData data_;
     std::vector<Box> sheet_boxes_, edge_groups_, triangle_groups_;
     Sheet sheet_{};
