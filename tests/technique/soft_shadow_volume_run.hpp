@@ -7,52 +7,12 @@
 #include <vector>
 
 #include "oracle/soft_shadow_volume_oracle.hpp"
+#include "support/casters.hpp"
 #include "support/device_run.hpp"
 #include "support/maps.hpp"
 #include "technique/soft_shadow_volume.hpp"
 
 namespace penumbra::test {
-
-// Lights as in maps.hpp: at the origin, along -Z. Light space is (x, y, -z) of the world.
-inline Vec3 world_of(double x, double y, double z) { return {x, y, -z}; }
-inline SphereLight sphere_light(double radius)
-{
-    return {.center = {0, 0, 0}, .radius = radius, .direction = {0, 0, -1}, .up = Vec3(0, 1, 0)};
-}
-
-inline TriangleMesh mesh_of(const std::vector<Vec3>& points, const std::vector<std::array<std::uint32_t, 3>>& triangles)
-{
-    TriangleMesh mesh;
-    for (const Vec3& p : points) mesh.positions.emplace_back(world_of(p.x, p.y, p.z));
-    mesh.triangles = triangles;
-    return mesh;
-}
-
-// Rectangles by light-space coordinates: parallel to the light, and with four corners of their own.
-inline TriangleMesh sheet(double x0, double x1, double y0, double y1, double z)
-{
-    return mesh_of({{x0, y0, z}, {x1, y0, z}, {x1, y1, z}, {x0, y1, z}}, {{0, 1, 2}, {0, 2, 3}});
-}
-inline TriangleMesh sheet(const std::array<Vec3, 4>& c) { return mesh_of({c[0], c[1], c[2], c[3]}, {{0, 1, 2}, {0, 2, 3}}); }
-
-inline TriangleMesh closed_box(const Vec3& low, const Vec3& high)
-{
-    std::vector<Vec3> points;
-    for (int i = 0; i < 8; ++i)
-        points.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z);
-    return mesh_of(points, {{0, 2, 3},
-                            {0, 3, 1},
-                            {4, 5, 7},
-                            {4, 7, 6},
-                            {0, 1, 5},
-                            {0, 5, 4},
-                            {2, 6, 7},
-                            {2, 7, 3},
-                            {0, 4, 6},
-                            {0, 6, 2},
-                            {1, 3, 7},
-                            {1, 7, 5}});
-}
 
 // Triangles anywhere in the box, each a mesh of its own.
 inline std::vector<TriangleMesh> soup(int count, const Vec3& low, const Vec3& high, std::uint32_t seed)
