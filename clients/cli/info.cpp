@@ -11,10 +11,10 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
+#include "engine/report.hpp"
 #include "opencl/cache_folder.hpp"
 #include "scene/parallel.hpp"
 #include "streams.hpp"
-#include "technique/table.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
 
@@ -61,50 +61,20 @@ Found find(const std::string& selector)
     return found;
 }
 
-Json json_of(const DeviceInfo& device, bool selected)
-{
-    return {{"index", device.index},
-            {"name", device.name},
-            {"vendor", device.vendor},
-            {"driver", device.driver},
-            {"version", device.version},
-            {"platform", device.platform},
-            {"type", device.type},
-            {"compute_units", device.compute_units},
-            {"global_bytes", device.global_bytes},
-            {"max_allocation_bytes", device.max_allocation_bytes},
-            {"local_bytes", device.local_bytes},
-            {"max_work_group", device.max_work_group},
-            {"lanes", device.lanes},
-            {"selected", selected}};
-}
-
-struct DomainJson {
-    Json& key;
-    void operator()(const Flag&) const { key["type"] = "boolean"; }
-    void operator()(const IntegerRange& range) const { key.update({{"type", "integer"}, {"minimum", range.low}, {"maximum", range.high}}); }
-    void operator()(const RealRange& range) const { key.update({{"type", "number"}, {"minimum", range.low}, {"maximum", range.high}}); }
-    void operator()(const Choices& choices) const { key.update({{"type", "string"}, {"enum", choices.names}}); }
-};
-
-Json json_of(const TechniqueRow& row)
+Json technique_json(const TechniqueRow& row)
 {
     Json keys = Json::array();
     for (const SettingKey& setting : row.keys) {
         Json key = {{"name", setting.name}};
-        std::visit(DomainJson{key}, setting.domain);
+        key.update(domain_json(setting));
         if (!setting.unit.empty()) key["unit"] = setting.unit;
-        key["default"] = std::visit([](const auto& value) { return Json(value); }, setting.get(row.defaults));
+        key["default"] = default_json(setting, row);
         key["meaning"] = setting.meaning;
         keys.push_back(key);
     }
-    return {{"kind", row.kind},
-            {"summary", row.summary},
-            {"source", row.source},
-            {"lights", row.lights},
-            {"textured_lights", row.textured_lights},
-            {"inputs", row.inputs},
-            {"keys", keys}};
+    Json technique = json_of(row);
+    technique["keys"] = keys;
+    return technique;
 }
 
 std::string compiler()
@@ -120,7 +90,7 @@ std::string json_text(const Found& found, const Json& environment)
 {
     Json devices = Json::array(), techniques = Json::array();
     for (const DeviceInfo& device : found.devices) devices.push_back(json_of(device, device.index == found.selected));
-    for (const TechniqueRow& row : technique_table()) techniques.push_back(json_of(row));
+    for (const TechniqueRow& row : technique_table()) techniques.push_back(technique_json(row));
     const Json json = {{"version", version()},
                        {"build", {{"type", PENUMBRA_BUILD_TYPE}, {"compiler", compiler()}}},
                        {"devices", devices},

@@ -1,5 +1,5 @@
-// The report as JSON. Keys and their order are the contract's (section 3); `pairs` is an addition and left out when it means nothing.
-#include <penumbra/engine.hpp>
+// The report as JSON, and what it has in common with descriptions: devices, techniques, settings.
+#include "engine/report.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -7,10 +7,65 @@ namespace penumbra {
 
 using Json = nlohmann::ordered_json;
 
+namespace {
+
+struct DomainJson {
+    Json operator()(const Flag&) const { return Json::object({{"type", "boolean"}}); }
+    Json operator()(const IntegerRange& range) const
+    {
+        return Json::object({{"type", "integer"}, {"minimum", range.low}, {"maximum", range.high}});
+    }
+    Json operator()(const RealRange& range) const
+    {
+        return Json::object({{"type", "number"}, {"minimum", range.low}, {"maximum", range.high}});
+    }
+    Json operator()(const Choices& choices) const { return Json::object({{"type", "string"}, {"enum", choices.names}}); }
+};
+
+Json json_of(const SettingValue& value)
+{
+    return std::visit([](const auto& held) { return Json(held); }, value);
+}
+
+} // namespace
+
+Json json_of(const DeviceInfo& device, bool selected)
+{
+    return {{"index", device.index},
+            {"name", device.name},
+            {"vendor", device.vendor},
+            {"driver", device.driver},
+            {"version", device.version},
+            {"platform", device.platform},
+            {"type", device.type},
+            {"compute_units", device.compute_units},
+            {"global_bytes", device.global_bytes},
+            {"max_allocation_bytes", device.max_allocation_bytes},
+            {"local_bytes", device.local_bytes},
+            {"max_work_group", device.max_work_group},
+            {"lanes", device.lanes},
+            {"selected", selected}};
+}
+
+Json json_of(const TechniqueRow& row)
+{
+    return {{"kind", row.kind},
+            {"summary", row.summary},
+            {"source", row.source},
+            {"lights", row.lights},
+            {"textured_lights", row.textured_lights},
+            {"inputs", row.inputs}};
+}
+
+Json domain_json(const SettingKey& setting) { return std::visit(DomainJson{}, setting.domain); }
+
+Json default_json(const SettingKey& setting, const TechniqueRow& row) { return json_of(setting.get(row.defaults)); }
+
+// Keys and their order are the contract's (section 3); `pairs` is an addition and left out when it means nothing.
 std::string report_json(const Report& report)
 {
     Json settings = Json::object();
-    for (const auto& [key, value] : report.settings) settings[key] = std::visit([](const auto& held) { return Json(held); }, value);
+    for (const auto& [key, value] : report.settings) settings[key] = json_of(value);
 
     Json stages = Json::array();
     for (const Stage& stage : report.stages)
