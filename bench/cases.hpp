@@ -16,6 +16,8 @@ void baselines(const Engine& engine);     // shadow maps: hard, percentage-close
 void large(const Engine& engine);         // 4096 x 4096 receivers, 2048 x 2048 occluders
 void wedges(const Engine& engine);        // soft_shadow_volume: overlap, splits, spheres, beside rays
 void wedge_culling(const Engine& engine); // what each culling spares; the light's size
+void wedge_models(const Engine& engine);  // soft_shadow_volume on several meshes beside soft_shadow_map and rays
+void wedge_growth(const Engine& engine);  // its time over silhouette edges and over receivers
 void image_io(const Engine& engine);      // images from and to bytes beside OpenImageIO
 void limits(const Engine& engine);        // the device's arithmetic and memory limits, and what the inner loop reaches
 

@@ -29,6 +29,8 @@ constexpr Case cases[] = {
     {"large", large, "4096 x 4096 receivers, 2048 x 2048 occluders"},
     {"wedges", wedges, "soft_shadow_volume: overlap, light splits, spheres, beside Embree's"},
     {"wedge_culling", wedge_culling, "soft_shadow_volume: what each culling spares (Papers II and IV); the light's size"},
+    {"wedge_models", wedge_models, "soft_shadow_volume on five meshes, beside soft_shadow_map and Embree's"},
+    {"wedge_growth", wedge_growth, "soft_shadow_volume: time over silhouette edges, and over receivers"},
     {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},
 };

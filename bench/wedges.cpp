@@ -2,6 +2,7 @@
 #include "cases.hpp"
 #include "rows.hpp"
 #include "scenes.hpp"
+#include "silhouette/silhouette.hpp"
 
 namespace penumbra::bench {
 namespace {
@@ -11,7 +12,7 @@ void emit(const Engine& engine, const Scene& scene, const Technique& technique, 
 {
     Row row = measure(engine, scene, technique, reference, runs);
     row.bench = bench;
-    row.scene = name(Occluder::bunny);
+    row.scene = scene.objects.front().name;
     row.parameter = parameter;
     print(row);
 }
@@ -23,6 +24,15 @@ void rays(const Engine& engine, const Scene& scene, const Image& reference, cons
             const RayTraced settings{.samples = samples, .adaptive = adaptive, .first_samples = 16, .seed = 1};
             if (!adaptive || samples > 16) emit(engine, scene, settings, reference, bench, samples, 3);
         }
+}
+
+RayTraced adaptive(int samples) { return {.samples = samples, .adaptive = true, .first_samples = 16, .seed = 1}; }
+
+// Edges of the silhouette that the light's centre sees.
+std::size_t silhouette_edges(const TriangleMesh& mesh, const Vec3& from)
+{
+    const TriangleMesh* const list[] = {&mesh};
+    return silhouette_of(Topology(list), from).edges.size();
 }
 
 // The receivers of a scene as a camera beside the light sees them.
@@ -66,6 +76,52 @@ void wedge_culling(const Engine& engine)
         const Scene at = paper_scene(Occluder::bunny, {.light_side = side});
         const Image seen = reference_of(engine, at, 1024);
         emit(engine, at, SoftShadowVolume{}, seen, "wedge_light_size", side, 9);
+    }
+}
+
+void wedge_models(const Engine& engine)
+{
+    const std::string models = "/usr/share/assimp/models/", glmark2 = "/usr/share/glmark2/models/";
+    const std::pair<const char*, std::string> list[] = {{"bunny", glmark2 + "bunny.obj"},
+                                                        {"horse", glmark2 + "horse.3ds"},
+                                                        {"wuson", models + "PLY/Wuson.ply"},
+                                                        {"spider", models + "OBJ/spider.obj"},
+                                                        {"engine", models + "glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"}};
+    for (const auto& [name, path] : list) {
+        const TriangleMesh mesh = fitted_mesh(path);
+        const Scene scene = paper_scene(name, mesh, {});
+        const Image reference = reference_of(engine, scene, 4096);
+        for (const Overlap overlap : {Overlap::sum, Overlap::max})
+            for (const int splits : {1, 2, 4})
+                emit(engine, scene, SoftShadowVolume{.overlap = overlap, .light_splits = splits}, reference, "wedge_models", splits, 9);
+        for (const int texels : {128, 512})
+            for (const Sides sides : {Sides::front, Sides::both})
+                emit(engine, paper_scene(name, mesh, {.occluder_resolution = texels}), SoftShadowMap{.sides = sides}, reference,
+                     "wedge_models", texels, 9);
+        emit(engine, scene, RayTraced{.samples = 16, .adaptive = false, .first_samples = 16, .seed = 1}, reference, "wedge_models", 16, 5);
+        for (const int samples : {64, 256}) emit(engine, scene, adaptive(samples), reference, "wedge_models", samples, 3);
+    }
+}
+
+void wedge_growth(const Engine& engine)
+{
+    // Triangles: 1.8, 7.9, 31, 127, 511 thousand.
+    for (const std::uint32_t rings : {22U, 45U, 89U, 179U, 358U}) {
+        const TriangleMesh mesh = bumpy_ball(rings);
+        Scene scene = paper_scene("ball", mesh, {});
+        const std::size_t edges = silhouette_edges(scene.objects.front().mesh, std::get<RectangleLight>(scene.light).center);
+        scene.objects.front().name = "ball of " + std::to_string(edges) + " silhouette edges";
+        const Image reference = reference_of(engine, scene, 1024);
+        for (const int splits : {1, 4})
+            emit(engine, scene, SoftShadowVolume{.light_splits = splits}, reference, "wedge_growth",
+                 static_cast<double>(mesh.triangles.size()), splits == 1 ? 9 : 5);
+        emit(engine, scene, adaptive(64), reference, "wedge_growth", static_cast<double>(mesh.triangles.size()), 3);
+    }
+    for (const int side : {128, 256, 512, 1024, 2048}) {
+        const Scene scene = paper_scene(Occluder::bunny, {.receiver_resolution = side});
+        const Image reference = reference_of(engine, scene, 256);
+        emit(engine, scene, SoftShadowVolume{}, reference, "wedge_receivers", side, 5);
+        emit(engine, scene, adaptive(64), reference, "wedge_receivers", side, 3);
     }
 }
 
