@@ -130,6 +130,25 @@ void complete_shares(std::vector<PreparedSoftShadowVolume::Part>& parts)
     }
 }
 
+// A texture's tables, and how much of the light each part is.
+void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolume& prepared)
+{
+    const LightFrame frame = light_frame(light);
+    const int table = prepared.settings.table, splits = static_cast<int>(std::lround(std::sqrt(prepared.parts.size())));
+    const EmissionSums emission = emission_sums(emission_of(light), 2 * table);
+    const EmissionPart whole = emission_part(emission, parts_of(frame, 1).front(), 1);
+    prepared.channels = emission.channels;
+    prepared.program = constants_of(work.context(), frame, prepared.settings, emission.channels).specialisation();
+    const std::vector<LightPart> parts = parts_of(frame, splits);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const EmissionPart lit = emission_part(emission, parts[i], splits);
+        prepared.parts[i].coverage = coverage_table(work, prepared.program, emission, lit, table);
+        for (std::size_t c = 0; c < static_cast<std::size_t>(emission.channels); ++c)
+            prepared.parts[i].light.share[c] = static_cast<float>(lit.light[c] / whole.light[c]);
+    }
+    complete_shares(prepared.parts);
+}
+
 // The receivers' camera as the part's tiles see it (the kernel's `eye`).
 cl_float4 eye_of(const ReceiverView& view, const WedgeLight& light, bool wanted)
 {
@@ -186,11 +205,9 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     const LightFrame frame = light_frame(light);
     const bool extent = frame.half_u > 0 || frame.half_v > 0, textured = settings.coverage == Coverage::texture;
     const int splits = extent ? settings.light_splits : 1;
-    const EmissionSums emission = textured ? emission_sums(emission_of(light), 2 * settings.table) : EmissionSums{};
-    const EmissionPart whole = textured ? emission_part(emission, parts_of(frame, 1).front(), 1) : EmissionPart{};
     PreparedSoftShadowVolume prepared{.settings = settings,
-                                      .channels = emission.channels,
-                                      .program = constants_of(work.context(), frame, settings, emission.channels).specialisation(),
+                                      .channels = 1,
+                                      .program = constants_of(work.context(), frame, settings, 1).specialisation(),
                                       .parts = {},
                                       .edges = 0,
                                       .triangles = 0,
@@ -217,15 +234,21 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
             left_out += wedges.left_out;
             unshared += wedges.unshared;
         }
-        if (!textured) continue;
-        const EmissionPart lit = emission_part(emission, part, splits);
-        prepared.parts.back().coverage = coverage_table(work, prepared.program, emission, lit, settings.table);
-        for (std::size_t c = 0; c < static_cast<std::size_t>(emission.channels); ++c)
-            prepared.parts.back().light.share[c] = static_cast<float>(lit.light[c] / whole.light[c]);
     }
     if (linear) prepared.warnings = linear_warnings(frame, prepared, left_out, unshared);
-    complete_shares(prepared.parts);
+    if (textured)
+        set_emission(work, light, prepared);
+    else
+        complete_shares(prepared.parts);
     return prepared;
+}
+
+PreparedSoftShadowVolume with_emission_of(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light)
+{
+    check_settings(light, prepared.settings);
+    PreparedSoftShadowVolume other = prepared;
+    set_emission(work, light, other);
+    return other;
 }
 
 void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const ReceiverPoints& receivers,

@@ -37,6 +37,10 @@ struct Casters {
 PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Light& light, const Casters& casters,
                                                     const SoftShadowVolume& settings);
 
+// The same silhouettes, on the same buffers, under the emission of `light`, which is otherwise the light that they were prepared for: what
+// depends on emission alone is computed. Has the bits of preparing anew.
+PreparedSoftShadowVolume with_emission_of(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light);
+
 // The view that receivers are to come in: of a right angle, so that xi and eta are tangents.
 Camera wedge_view(const Light& light);
 
