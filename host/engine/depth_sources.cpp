@@ -7,6 +7,7 @@
 
 #include "engine/geometry.hpp"
 #include "scene/light_space.hpp"
+#include "scene/lights.hpp"
 
 namespace penumbra {
 namespace {
@@ -116,10 +117,24 @@ Receivers with_depth(const Receivers& given, const Light& light, const Geometry&
 
 Scene with_depth(const Scene& scene, const Technique& technique)
 {
+    validate_lights(scene);
     const Geometry geometry = view_of(scene);
     Scene result = scene;
-    result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique));
-    result.receivers = with_depth(scene.receivers, scene.light, geometry);
+    if (scene.lights.empty()) {
+        result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique));
+        result.receivers = with_depth(scene.receivers, scene.light, geometry);
+        return result;
+    }
+    for (std::size_t i = 0; i < result.lights.size(); ++i) {
+        SceneLight& light = result.lights[i];
+        const bool own = light.occluders.has_value();
+        try {
+            light.occluders = occluders_with_depth(light.light, own ? *light.occluders : scene.occluders, geometry, needs_of(technique));
+        } catch (const Error& error) {
+            throw in_list(error, i, own);
+        }
+    }
+    result.receivers = with_depth(scene.receivers, scene.lights.front().light, geometry);
     return result;
 }
 

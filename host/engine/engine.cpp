@@ -3,9 +3,7 @@
 #include <penumbra/error.hpp>
 
 #include "engine/depth_sources.hpp"
-#include "engine/geometry.hpp"
 #include "engine/impl.hpp"
-#include "engine/state.hpp"
 
 namespace penumbra {
 
@@ -17,29 +15,6 @@ Engine::Engine(Engine&&) noexcept = default;
 Engine& Engine::operator=(Engine&&) noexcept = default;
 
 const DeviceInfo& Engine::device() const { return impl_->context->info(); }
-
-Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(scene.technique)); }
-
-Mask Engine::mask(const Scene& scene, const Technique& technique) const
-{
-    const Stopwatch total;
-    const Geometry geometry = view_of(scene);
-    const Prepared prepared = prepare(scene.light, scene.occluders, geometry, technique);
-
-    const Stopwatch render;
-    const Receivers receivers = with_depth(scene.receivers, scene.light, geometry);
-    const Stage rendered{"render depth", render.ms(), 0, 0};
-
-    Mask mask = shade(prepared, receivers);
-    std::vector<Stage> stages{rendered};
-    add_stages(stages, prepared.state().stages);
-    add_stages(stages, mask.report.stages);
-    mask.report.stages = std::move(stages);
-    mask.report.prepare_ms = prepared.state().prepare_ms;
-    mask.report.warnings.insert(mask.report.warnings.begin(), scene.warnings.begin(), scene.warnings.end());
-    mask.report.total_ms = total.ms();
-    return mask;
-}
 
 void check_device_buffer(cl_mem buffer, int width, int height, const char* what)
 {

@@ -14,7 +14,8 @@ std::uint64_t Geometry::bytes() const { return state_->bytes(); }
 
 Geometry view_of(const Scene& scene)
 {
-    return Geometry(std::make_shared<const Geometry::State>(&scene.objects, light_frame(scene.light).origin));
+    const Light& first = scene.lights.empty() ? scene.light : scene.lights.front().light;
+    return Geometry(std::make_shared<const Geometry::State>(&scene.objects, light_frame(first).origin));
 }
 
 bool Geometry::State::any(bool Object::*role) const

@@ -40,7 +40,7 @@ private:
     mutable std::shared_ptr<const Topology> topology_;
 };
 
-// A scene's objects without copying them: the scene has to stay.
+// A scene's objects without copying them, near its first light: the scene has to stay.
 Geometry view_of(const Scene& scene);
 
 } // namespace penumbra

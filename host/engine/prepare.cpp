@@ -7,6 +7,7 @@
 #include "engine/geometry.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
+#include "scene/lights.hpp"
 #include "technique/table.hpp"
 
 namespace penumbra {
@@ -25,10 +26,18 @@ bool has_no_extent(const Light& light)
     return frame.half_u == 0 && frame.half_v == 0;
 }
 
+void refuse_sequence(const Light& light)
+{
+    if (const std::size_t frames = frames_of(light); frames > 0)
+        throw Error(ErrorCode::usage, "light.emission: is a sequence of " + std::to_string(frames) + " images, expected one",
+                    "masks computes them all, only_frame takes one, with_emission goes on to the next");
+}
+
 std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::Context>& context, const Light& light,
                                            const Technique& technique)
 {
     validate(light);
+    refuse_sequence(light);
     check_light(light, technique);
     auto state = std::make_shared<Prepared::State>();
     state->context = context;
@@ -226,7 +235,7 @@ void check_light(const Light& light, const Technique& technique)
         throw Error(ErrorCode::unsupported, "light.kind: " + std::string(row.kind) + " cannot take a " + kind + " light", hint);
     }
     const auto* rectangle = std::get_if<RectangleLight>(&light);
-    if (rectangle && rectangle->emission && !row.textured_lights)
+    if (rectangle && (rectangle->emission || !rectangle->frames.empty()) && !row.textured_lights)
         throw Error(ErrorCode::unsupported, "light.emission: " + std::string(row.kind) + " cannot take a textured light", "ray_traced can");
 }
 
@@ -261,6 +270,9 @@ Prepared Engine::prepare(const Light& light, const Occluders& occluders, const T
 
 Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 {
+    if (!scene.lights.empty())
+        throw Error(ErrorCode::usage, "lights: are " + std::to_string(scene.lights.size()) + ", and one can be prepared",
+                    "masks computes them all, only_light takes one");
     return prepare(scene.light, scene.occluders, view_of(scene), technique);
 }
 
@@ -274,6 +286,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
 
     validate(light);
     check_light(light, technique);
+    refuse_sequence(light);
     const Stopwatch watch;
     const Occluders occluders = occluders_with_depth(light, given, geometry, needs_of(technique));
     const Stage render{"render depth", watch.ms(), 0, 0};
@@ -282,6 +295,31 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     state->covered = !geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view);
     const auto* soft = std::get_if<SoftShadowMap>(&technique);
     if (soft && soft->project && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
+    return Prepared(state);
+}
+
+Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) const
+{
+    const Prepared::State& before = prepared.state();
+    auto* rectangle = std::get_if<RectangleLight>(&before.light);
+    if (!rectangle) throw Error(ErrorCode::usage, "light.emission: was prepared for a " + kind_of(before.light), "expected a rectangle");
+    auto state =
+        new_state(before.context, RectangleLight{rectangle->center, rectangle->half_u, rectangle->half_v, emission}, before.technique);
+    state->light_view = before.light_view;
+    state->covered = before.covered;
+    state->warnings = before.warnings;
+    if (const auto* rays = std::get_if<PreparedRays>(&before.data)) {
+        state->data = PreparedRays{.settings = rays->settings, .light = state->light, .casters = rays->casters};
+        return Prepared(state);
+    }
+    opencl::Work work(state->context);
+    work.stage("prepare");
+    state->data = with_emission_of(work, std::get<PreparedSoftShadowVolume>(before.data), state->light);
+    add_stages(state->stages, work.finish());
+    state->prepare_ms = work_ms(state->stages);
+    state->peak_bytes = work.memory().peak;
+    state->memory = work.memory_ptr();
+    state->shared = before.shared ? before.shared : before.memory;
     return Prepared(state);
 }
 

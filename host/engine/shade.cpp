@@ -128,7 +128,8 @@ Mask shade_on_device(const Prepared::State& state, const Receivers& receivers, c
 
     add_stages(mask.report.stages, work.finish());
     mask.report.shade_ms = work_ms(mask.report.stages);
-    mask.report.peak_device_bytes = std::max<std::uint64_t>(state.peak_bytes, state.memory->live + work.memory().peak);
+    const std::uint64_t kept = state.memory->live + (state.shared ? state.shared->live.load() : 0);
+    mask.report.peak_device_bytes = std::max<std::uint64_t>(state.peak_bytes, kept + work.memory().peak);
     mask.report.total_ms = total.ms();
     warn_of_counts(state, counts, mask.report);
     return mask;

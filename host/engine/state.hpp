@@ -38,6 +38,7 @@ struct Prepared::State {
     std::vector<Stage> stages;
     double prepare_ms = 0;
     std::shared_ptr<opencl::MemoryMeter> memory; // of what is kept on the device
+    std::shared_ptr<opencl::MemoryMeter> shared; // of what it has from the state that it was made from; may be null
     std::uint64_t peak_bytes = 0;                // while preparing
     std::vector<std::string> warnings;
 };
@@ -47,6 +48,10 @@ void check_light(const Light& light, const Technique& technique);
 
 // The time of all stages but compiling and rendering depth.
 double work_ms(const std::vector<Stage>& stages);
+
+// Adds the report of one light to that of all together: its work, and its warnings under its name. `common` are warnings of the scene, which
+// stand in front of those of each light.
+void add_report(Report& all, const Report& one, const std::string& name, const std::vector<std::string>& common);
 
 // Appends stages, joining those of the same name.
 void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more);

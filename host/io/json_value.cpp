@@ -194,6 +194,11 @@ JsonObject::JsonObject(const JsonValue& value, std::initializer_list<std::string
 
 void JsonObject::allow_only(std::initializer_list<std::string_view> known, std::string_view of) const
 {
+    allow_only(std::span(known.begin(), known.size()), of);
+}
+
+void JsonObject::allow_only(std::span<const std::string_view> known, std::string_view of) const
+{
     for (const auto& [name, member] : members()) {
         if (std::ranges::find(known, std::string_view(name)) != known.end()) continue;
         std::string list;

@@ -61,6 +61,7 @@ public:
     JsonObject(const JsonValue& value, std::initializer_list<std::string_view> known, std::string_view of = {});
 
     void allow_only(std::initializer_list<std::string_view> known, std::string_view of = {}) const;
+    void allow_only(std::span<const std::string_view> known, std::string_view of = {}) const;
 
     const JsonValue& value() const { return value_; }
     bool has(std::string_view key) const { return value_.json().contains(key); }

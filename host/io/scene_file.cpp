@@ -1,5 +1,6 @@
 #include "io/scene_file.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include <penumbra/technique.hpp>
@@ -22,9 +23,12 @@ SettingValue read_setting(const JsonValue& value)
     throw value.expected("true, false, a number or a string");
 }
 
+bool has_images(const Occluders& occluders) { return occluders.front || occluders.back || !occluders.layers.empty(); }
+
 bool has_images(const Scene& scene)
 {
-    return scene.occluders.front || scene.occluders.back || !scene.occluders.layers.empty() || scene.receivers.depth;
+    return has_images(scene.occluders) || scene.receivers.depth ||
+           std::ranges::any_of(scene.lights, [](const SceneLight& light) { return light.occluders && has_images(*light.occluders); });
 }
 
 } // namespace
@@ -62,7 +66,7 @@ Scene parse_scene(std::string_view json, const Resources& resources)
     const JsonObject root(JsonValue(document, {}));
     const JsonValue version = root.need("penumbra");
     if (!version.json().is_number_integer() || version.json() != 1) throw version.expected("1, the version of the scene file");
-    root.allow_only({"penumbra", "light", "objects", "occluders", "receivers", "technique", "output"});
+    root.allow_only({"penumbra", "light", "lights", "objects", "occluders", "receivers", "technique", "output"});
 
     // What is cheap to refuse comes before images and meshes.
     Scene scene;
@@ -71,14 +75,13 @@ Scene parse_scene(std::string_view json, const Resources& resources)
         scene.technique = parse_technique(*technique);
         technique_from(scene.technique); // for its errors, which name the key
     }
-    scene.light = parse_light(root.need("light"), resources);
-    if (const auto occluders = root.find("occluders"))
-        scene.occluders = parse_occluders(*occluders, scene.light, resources, scene.warnings);
-    if (const auto receivers = root.find("receivers"))
-        scene.receivers = parse_receivers(*receivers, scene.light, resources, scene.warnings);
+    parse_lights(root, resources, scene);
+    check_shared_views(root);
+    parse_all_occluders(root, resources, scene);
+    const Light& light = first_light(scene);
+    if (const auto receivers = root.find("receivers")) scene.receivers = parse_receivers(*receivers, light, resources, scene.warnings);
     if (const auto objects = root.find("objects"))
-        for (const JsonValue& object : objects->elements())
-            scene.objects.push_back(parse_object(object, scene.light, resources, scene.warnings));
+        for (const JsonValue& object : objects->elements()) scene.objects.push_back(parse_object(object, light, resources, scene.warnings));
     if (scene.objects.empty() && !has_images(scene))
         throw Error(ErrorCode::invalid_input, "the scene has nothing in it",
                     "give objects, or occluders.depth and receivers.depth, or both");

@@ -55,11 +55,16 @@ private:
 Scene parse_scene(std::string_view json, const Resources& resources);
 
 // A scene file's JSON for `scene`, with its depth images under the given names (empty: left out), cameras explicit. Objects are not
-// written. Throws usage for a light's emission without a name, and for more layers than names or the other way round.
-struct DepthNames {
-    std::string front, back, receiver;
+// written. Throws usage for an emission without a name, and for more layers, frames or lights than names or the other way round.
+struct LightNames {
+    std::string front, back;
     std::vector<std::string> layers;
-    std::string emission; // the light's, when it has one
+    std::string emission;            // the light's, when it has one
+    std::vector<std::string> frames; // of its sequence
+};
+struct DepthNames : LightNames {
+    std::string receiver;
+    std::vector<LightNames> lights; // of scene.lights, each with its own occluders
 };
 std::string write_scene(const Scene& scene, const DepthNames& names);
 

@@ -11,8 +11,23 @@
 
 namespace penumbra {
 
-// Light (scene_light.cpp); the emission image comes through `resources`.
-Light parse_light(const JsonValue& value, const Resources& resources);
+// Lights (scene_light.cpp); emission images come through `resources`. What is wrong with a light is told under the key of `value`. A member
+// of `lights` may have the keys of SceneLight as well, which are left to others.
+Light parse_light(const JsonValue& value, const Resources& resources, bool listed = false);
+
+// Of every light its name and weight (scene_lights.cpp); nothing is loaded.
+std::vector<SceneLight> parse_light_names(const JsonValue& value);
+
+// `light` or `lights`, whichever of the two the scene has, into `scene` (scene_lights.cpp). Throws unless there is exactly one of them.
+void parse_lights(const JsonObject& root, const Resources& resources, Scene& scene);
+
+// What lights cannot share is refused, before images and meshes are read: their own view, for receivers and in objects. And `occluders`,
+// of each light or shared (scene_lights.cpp).
+void check_shared_views(const JsonObject& root);
+void parse_all_occluders(const JsonObject& root, const Resources& resources, Scene& scene);
+
+// The scene's light, or the first of its lights.
+const Light& first_light(const Scene& scene);
 
 // Camera (scene_camera.cpp). A light's camera depends on whether the light is directional.
 CameraSpec parse_camera(const JsonValue& value, const Light& light);

@@ -14,36 +14,44 @@ namespace {
 ordered_json array(const Vec3& v) { return {v.x, v.y, v.z}; }
 ordered_json array(const Vec2& v) { return {v.x, v.y}; }
 
+void check_count(std::size_t count, std::size_t names, const char* what)
+{
+    if (count != names)
+        throw Error(ErrorCode::usage, std::to_string(count) + " " + what + " and " + std::to_string(names) + " names for them");
+}
+
 template <class AxisLight> void write_axes(ordered_json& json, const AxisLight& light)
 {
     json["direction"] = array(light.direction);
     if (light.up) json["up"] = array(*light.up);
 }
 
-ordered_json write(const RectangleLight& light, const DepthNames& names)
+ordered_json write(const RectangleLight& light, const LightNames& names)
 {
     ordered_json json{
         {"kind", "rectangle"}, {"center", array(light.center)}, {"half_u", array(light.half_u)}, {"half_v", array(light.half_v)}};
+    check_count(light.frames.size(), names.frames.size(), "frames of emission");
+    if (!light.frames.empty()) json["emission"] = names.frames;
     if (light.emission && names.emission.empty()) throw Error(ErrorCode::usage, "the light's emission has no name to be written under");
     if (light.emission) json["emission"] = names.emission;
     return json;
 }
 
-ordered_json write(const SphereLight& light, const DepthNames&)
+ordered_json write(const SphereLight& light, const LightNames&)
 {
     ordered_json json{{"kind", "sphere"}, {"center", array(light.center)}, {"radius", light.radius}};
     write_axes(json, light);
     return json;
 }
 
-ordered_json write(const PointLight& light, const DepthNames&)
+ordered_json write(const PointLight& light, const LightNames&)
 {
     ordered_json json{{"kind", "point"}, {"center", array(light.center)}};
     write_axes(json, light);
     return json;
 }
 
-ordered_json write(const DirectionalLight& light, const DepthNames&)
+ordered_json write(const DirectionalLight& light, const LightNames&)
 {
     ordered_json json{{"kind", "directional"}, {"angular_diameter_deg", light.angular_diameter_deg}};
     write_axes(json, light);
@@ -75,11 +83,9 @@ ordered_json write_technique(const TechniqueRequest& request)
     return json;
 }
 
-ordered_json write_occluders(const Occluders& occluders, const DepthNames& names)
+ordered_json write_occluders(const Occluders& occluders, const LightNames& names)
 {
-    if (occluders.layers.size() != names.layers.size())
-        throw Error(ErrorCode::usage, std::to_string(occluders.layers.size()) + " layers of occluder depth and " +
-                                          std::to_string(names.layers.size()) + " names for them");
+    check_count(occluders.layers.size(), names.layers.size(), "layers of occluder depth");
     ordered_json depth = ordered_json::object();
     if (!names.front.empty()) depth["front"] = names.front;
     if (!names.back.empty()) depth["back"] = names.back;
@@ -87,6 +93,19 @@ ordered_json write_occluders(const Occluders& occluders, const DepthNames& names
     ordered_json json{{"camera", write_camera(occluders.camera, occluders.width, occluders.height)},
                       {"resolution", {occluders.width, occluders.height}}};
     if (!depth.empty()) json["depth"] = depth;
+    return json;
+}
+
+ordered_json write_light(const Light& light, const LightNames& names)
+{
+    return std::visit([&](const auto& kind) { return write(kind, names); }, light);
+}
+
+ordered_json write_listed(const SceneLight& light, const LightNames& names)
+{
+    ordered_json json{{"name", light.name}, {"weight", light.weight}};
+    json.update(write_light(light.light, names));
+    if (light.occluders) json["occluders"] = write_occluders(*light.occluders, names);
     return json;
 }
 
@@ -103,8 +122,14 @@ ordered_json write_receivers(const Receivers& receivers, const DepthNames& names
 std::string write_scene(const Scene& scene, const DepthNames& names)
 {
     ordered_json json{{"penumbra", 1}};
-    json["light"] = std::visit([&](const auto& light) { return write(light, names); }, scene.light);
-    json["occluders"] = write_occluders(scene.occluders, names);
+    check_count(scene.lights.size(), names.lights.size(), "lights");
+    bool shared = scene.lights.empty();
+    if (scene.lights.empty()) json["light"] = write_light(scene.light, names);
+    for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+        json["lights"].push_back(write_listed(scene.lights[i], names.lights[i]));
+        shared |= !scene.lights[i].occluders;
+    }
+    if (shared) json["occluders"] = write_occluders(scene.occluders, names);
     json["receivers"] = write_receivers(scene.receivers, names);
     json["technique"] = write_technique(scene.technique);
     if (!scene.output.format.empty()) {

@@ -5,6 +5,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/lights.hpp"
+
 namespace penumbra {
 namespace {
 
@@ -68,6 +70,18 @@ void validate_axes(const Vec3& direction, const std::optional<Vec3>& up)
         reject("light.up: is parallel to light.direction", "expected a vector that points away from it");
 }
 
+void validate_emission(const Image& image, const std::string& key)
+{
+    if (image.channels != 1 && image.channels != 3)
+        reject(key + ": has " + std::to_string(image.channels) + " channels", "expected 1 or 3, no alpha");
+    bool light_somewhere = false;
+    for (const float e : image.pixels) {
+        if (!std::isfinite(e) || e < 0) reject(key + ": has a pixel of " + std::to_string(e), "expected finite values, 0 or more");
+        light_somewhere |= e > 0;
+    }
+    if (!light_somewhere) reject(key + ": is black", "expected at least one pixel above 0");
+}
+
 void validate(const RectangleLight& light)
 {
     if (!finite(light.center)) reject("light.center: is not finite", "expected three finite numbers");
@@ -78,18 +92,20 @@ void validate(const RectangleLight& light)
     if (cosine > 1e-5)
         reject("light.half_v: is not orthogonal to light.half_u (the cosine between them is " + std::to_string(cosine) + ")",
                "expected half-edges at a right angle, cosine at most 0.00001");
-    if (!light.emission) return;
+    if (light.emission && !light.frames.empty()) reject("light.emission: is an image and a sequence", "expected one of the two");
+    if (!light.emission && light.frames.empty()) return;
     if (light.half_u.length() == 0 || light.half_v.length() == 0)
         reject("light.emission: the rectangle has no area", "expected half_u and half_v that are not zero, or no emission");
-    const Image& image = *light.emission;
-    if (image.channels != 1 && image.channels != 3)
-        reject("light.emission: has " + std::to_string(image.channels) + " channels", "expected 1 or 3, no alpha");
-    bool light_somewhere = false;
-    for (const float e : image.pixels) {
-        if (!std::isfinite(e) || e < 0) reject("light.emission: has a pixel of " + std::to_string(e), "expected finite values, 0 or more");
-        light_somewhere |= e > 0;
+    if (light.emission) validate_emission(*light.emission, "light.emission");
+    if (light.frames.size() > max_frames)
+        reject("light.emission: has " + std::to_string(light.frames.size()) + " frames", "expected at most " + std::to_string(max_frames));
+    for (std::size_t i = 0; i < light.frames.size(); ++i) {
+        const std::string key = "light.emission[" + std::to_string(i) + "]";
+        validate_emission(light.frames[i], key);
+        if (light.frames[i].channels != light.frames[0].channels)
+            reject(key + ": has " + std::to_string(light.frames[i].channels) + " channels",
+                   "expected " + std::to_string(light.frames[0].channels) + ", as the first frame has");
     }
-    if (!light_somewhere) reject("light.emission: is black", "expected at least one pixel above 0");
 }
 
 void validate(const SphereLight& light)

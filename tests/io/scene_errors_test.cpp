@@ -51,7 +51,7 @@ TEST(SceneErrors, TopLevel)
         {quad, "light: is missing"},
         {rectangle, "nothing in it"},
         {rectangle + R"(, "objects": [])", "nothing in it"},
-        {rectangle + ", " + quad + R"(, "lights": [])", "lights: is an unknown key", "known: penumbra, light, objects"},
+        {rectangle + ", " + quad + R"(, "lamps": [])", "lamps: is an unknown key", "known: penumbra, light, lights, objects"},
         {rectangle + R"(, "objects": {})", "objects: is an object", "expected an array"},
         {rectangle + ", " + quad + R"(, "output": {"format": "jpg"})", "output: unknown image format", "exr, tif"},
         {rectangle + ", " + quad + R"(, "output": {"format": "png", "bits": 32})", "output: 32 bits"},

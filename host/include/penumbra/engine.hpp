@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -48,6 +49,16 @@ struct Mask {
     Image visibility;
     Report report;
 };
+
+// One of the masks of a scene with several lights or a sequence.
+struct NamedMask {
+    std::string light; // its name; empty: of all lights together, or of the only one
+    int frame = 0;     // from 1; 0: the scene has no sequence
+    Mask mask;
+};
+
+// Takes the masks as they come.
+using MaskSink = std::function<void(NamedMask&&)>;
 
 struct DeviceInfo {
     int index = 0; // in the list that `penumbra info` prints
@@ -109,8 +120,8 @@ struct DeviceOccluders {
 // Safe to use from several threads at once.
 class PENUMBRA_API Engine {
 public:
-    Engine();                                      // the device that PENUMBRA_DEVICE selects; without it, the first one
-    explicit Engine(const std::string& selector);  // an index, or a part of a device's name; throws device when none fits
+    Engine();                                        // the device that PENUMBRA_DEVICE selects; without it, the first one
+    explicit Engine(const std::string& selector);    // an index, or a part of a device's name; throws device when none fits
     Engine(cl_context context, cl_device_id device); // the caller's own; retained
     ~Engine();
     Engine(Engine&&) noexcept;
@@ -118,9 +129,18 @@ public:
 
     const DeviceInfo& device() const;
 
-    // Prepares and shades. Depth images that the technique needs and the scene lacks are rendered from its objects.
+    // Prepares and shades. Depth images that the technique needs and the scene lacks are rendered from its objects. With several lights the
+    // mask of all together: in each channel the mean by weight, summed in double in the order of the lights; of three channels when one of
+    // theirs is. Throws usage for a scene with a sequence.
     Mask mask(const Scene& scene) const; // by scene.technique
     Mask mask(const Scene& scene, const Technique& technique) const;
+
+    // Every mask of a scene: for each frame one of each light, in order, and then that of all together; of a scene without `lights` one for
+    // each frame. The lights share the objects' hierarchies, kept around the first light's centre, and the receivers' depth; the frames
+    // share what does not depend on emission (with_emission). One mask after the other: what the sink does not keep is gone.
+    std::vector<NamedMask> masks(const Scene& scene) const; // by scene.technique
+    std::vector<NamedMask> masks(const Scene& scene, const Technique& technique) const;
+    void masks(const Scene& scene, const Technique& technique, const MaskSink& sink) const;
 
     // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs objects: the second or the third.
     // What the technique needs and `occluders` lack is rendered from the objects.
@@ -129,10 +149,14 @@ public:
     Prepared prepare(const Light& light, const Occluders& occluders, const Geometry& geometry, const Technique& technique) const;
     Prepared prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const;
 
+    // The same light, a rectangle, with another emission: silhouettes, hierarchies and all else that does not depend on it are shared with
+    // `prepared`; the masks have the bits of preparing anew. Throws what preparing throws where the technique takes no textured light.
+    Prepared with_emission(const Prepared& prepared, const Image& emission) const;
+
     Mask shade(const Prepared& prepared, const Receivers& receivers) const;
 
-    // Device buffer to device buffer: `visibility` is float32, width * height, row-major. Returns when the work is queued on `queue` (of this
-    // engine's context and device, in order).
+    // Device buffer to device buffer: `visibility` is float32, width * height, row-major. Returns when the work is queued on `queue` (of
+    // this engine's context and device, in order).
     void shade(const Prepared& prepared, const DeviceReceivers& receivers, cl_mem visibility, cl_command_queue queue) const;
 
 private:
@@ -140,7 +164,8 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-// The scene with every depth image that `technique` needs in place (rendered from the objects), all cameras resolved.
+// The scene with every depth image that `technique` needs in place (rendered from the objects), all cameras resolved; of several lights
+// each with occluders of its own.
 PENUMBRA_API Scene with_depth(const Scene& scene, const Technique& technique);
 
 // The receivers with their depth in place (rendered from the objects that receive where it is missing) and their camera resolved.
@@ -148,6 +173,15 @@ PENUMBRA_API Receivers with_depth(const Receivers& receivers, const Light& light
 
 // The report as the JSON of the contract (section 3).
 PENUMBRA_API std::string report_json(const Report& report);
+
+// The reports of several masks as {"masks": [...]}: each as above, with `light` and `frame` (null where there is none) and `file` in front.
+struct FileReport {
+    std::string light; // as in NamedMask
+    int frame = 0;
+    std::string file;
+    Report report;
+};
+PENUMBRA_API std::string reports_json(const std::vector<FileReport>& reports);
 
 // The program's version, "1.2.3".
 PENUMBRA_API std::string version();

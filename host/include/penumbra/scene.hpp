@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -24,12 +25,14 @@ using Vec3 = Imath::V3d;
 // --- Lights (lengths in scene units) -----------------------------------------------------------------------------------------
 
 // Shines along normalize(cross(half_v, half_u)). `emission`, when given, lies over the rectangle, left to right along +half_u, top to
-// bottom along -half_v; 1 or 3 channels, not negative, not all zero.
+// bottom along -half_v; 1 or 3 channels, not negative, not all zero. `frames` instead is a sequence of such images, all of as many
+// channels: a fire, a film. Engine::masks computes a mask for each.
 struct RectangleLight {
     Vec3 center{0, 0, 0};
     Vec3 half_u{0, 0, 0}; // orthogonal half-edges
     Vec3 half_v{0, 0, 0};
     std::optional<Image> emission;
+    std::vector<Image> frames = {};
 };
 
 // Counts as the disc of its radius that faces the receiver.
@@ -67,7 +70,10 @@ struct DepthMap {
     double precision = 0x1p-24; // largest relative rounding error of a depth: of float32, or of what it was decoded from
 
     float& at(int x, int y) { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
-    float at(int x, int y) const { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
+    float at(int x, int y) const
+    {
+        return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+    }
 };
 
 // --- Cameras -----------------------------------------------------------------------------------------------------------------
@@ -144,8 +150,17 @@ struct TechniqueRequest {
     std::vector<std::pair<std::string, SettingValue>> settings;
 };
 
+// One of several lights. The mask of all together is the mean of theirs by weight.
+struct SceneLight {
+    std::string name;  // 1 to 64 of A-Z a-z 0-9 _ -, no two alike
+    double weight = 1; // its power relative to the others, in every channel; 0 or more
+    Light light;
+    std::optional<Occluders> occluders = {}; // seen from this light; without them the scene's
+};
+
 struct Scene {
     Light light;
+    std::vector<SceneLight> lights = {}; // when there are any, `light` is not looked at; receivers need a camera of their own
     std::vector<Object> objects;
     Occluders occluders;
     Receivers receivers;
@@ -157,5 +172,14 @@ struct Scene {
 // Reads a scene file (JSON, version 1) and every image and mesh that it names, relative to the file.
 // Throws Error naming file and key: not_found, invalid_input, too_large.
 PENUMBRA_API Scene load_scene(const std::string& path);
+
+// How many frames the scene's sequence has; 0 when no light has one.
+PENUMBRA_API int frame_count(const Scene& scene);
+
+// The scene with the light of that name alone, under `light`, and what it lights. Throws usage when there is none, listing those there are.
+PENUMBRA_API Scene only_light(Scene scene, std::string_view name);
+
+// The scene as it is in that frame, counted from 1, without a sequence. Throws usage for a frame that there is not.
+PENUMBRA_API Scene only_frame(Scene scene, int frame);
 
 } // namespace penumbra

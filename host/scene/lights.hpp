@@ -1,0 +1,41 @@
+// The lights of a scene: one, or a list of them with names and weights; and sequences of emission.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <penumbra/error.hpp>
+#include <penumbra/scene.hpp>
+
+namespace penumbra {
+
+constexpr std::size_t max_frames = 4096; // of a sequence
+constexpr std::size_t max_lights = 256;  // of a scene
+
+// How many frames the light's sequence has; 0: it has none.
+std::size_t frames_of(const Light& light);
+
+// The light as it shines in that frame, counted from 1: without its sequence, which is not copied.
+Light at_frame(const Light& light, int frame);
+
+// Throws invalid_input, naming the key, for a list that is too long, names that are no names or stand twice, weights that are negative, not
+// finite or all 0.
+void validate_names(std::span<const SceneLight> lights);
+
+// Throws invalid_input for sequences of different lengths.
+void validate_frames(std::span<const SceneLight> lights);
+
+// Throws invalid_input for depth seen from one light that several share.
+void validate_occluders(const Scene& scene);
+
+// All that the lights of a scene have to agree in: validate_names, each light by itself, the frames of their sequences, and that what
+// several lights share is not seen from one of them. A scene with one light passes when that light does.
+void validate_lights(const Scene& scene);
+
+// The error of a light by itself, in the words of a list: "light.center" becomes "lights[2].center", "occluders" (of its own)
+// "lights[2].occluders"; what names neither, nor receivers or objects, gets "lights[2]" in front.
+Error in_list(const Error& error, std::size_t index, bool own_occluders);
+
+} // namespace penumbra
