@@ -1,4 +1,5 @@
 // penumbra batch: many scenes, one process, one device.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -19,6 +20,7 @@
 #include "batch_list.hpp"
 #include "files.hpp"
 #include "io/image_format.hpp"
+#include "mask_files.hpp"
 #include "streams.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
@@ -36,7 +38,7 @@ struct Flags {
 
 constexpr const char* notes = R"(
 DIR: every *.json in it. LIST: a text file with a scene's path a line, relative to the list; # starts a comment.
-Each mask gets its scene's name, with the format as extension. A scene that fails does not stop the others: its error goes to standard error,
+Each mask gets its scene's name, with the format as extension; those of several lights and of a sequence as `penumbra mask` names them. A scene that fails does not stop the others: its error goes to standard error,
 and the exit code is 1 at the end (2 when wrong input was the only reason). --resume leaves out what is there already and not older than its
 scene file; outputs are renamed into place when whole, so what is there is whole. --shard I/N takes every N-th scene, starting at the I-th.
 OUT/manifest.jsonl (with --shard manifest-I-of-N.jsonl) says for each scene: done, skipped, failed or pending, milliseconds, error.
@@ -73,11 +75,12 @@ struct Outcome {
 std::string manifest_line(const BatchItem& item, const Outcome& outcome)
 {
     constexpr const char* names[] = {"pending", "skipped", "done", "failed"};
-    const nlohmann::ordered_json json = {{"scene", item.scene},
-                                         {"output", item.output},
-                                         {"status", names[static_cast<int>(outcome.status)]},
-                                         {"ms", outcome.ms},
-                                         {"error", outcome.error}};
+    nlohmann::ordered_json json = {{"scene", item.scene},
+                                   {"output", item.output},
+                                   {"status", names[static_cast<int>(outcome.status)]},
+                                   {"ms", outcome.ms},
+                                   {"error", outcome.error}};
+    if (item.outputs.size() > 1) json["outputs"] = item.outputs;
     return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -149,13 +152,18 @@ private:
 
     void compute(const BatchItem& item)
     {
-        require_not_named_in(item.scene, item.output, "--out");
+        require_not_named_in(item.scene, json_in(item.scene), item.outputs, "--out");
         Scene scene = load_scene(item.scene);
         const OutputFormat format = format_for(item.output, scene.output, "--out");
         scene.technique = apply(scene.technique, flags_.technique);
-        const Mask mask = engine_->mask(scene);
-        write_image(item.output, mask.visibility, format);
-        print_warnings(mask.report.warnings, item.scene);
+        std::vector<std::string> warnings;
+        engine_->masks(scene, technique_from(scene.technique), [&](NamedMask&& named) {
+            write_image(mask_file(item.output, named.light, named.frame), named.mask.visibility, format);
+            if (!named.light.empty()) return; // its warnings come again from all lights together
+            for (const std::string& warning : named.mask.report.warnings)
+                if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
+        });
+        print_warnings(warnings, item.scene);
     }
 
     void fail(Outcome& outcome, const Error& error)

@@ -10,8 +10,10 @@
 
 #include <penumbra/error.hpp>
 
+#include "files.hpp"
 #include "io/image_format.hpp"
 #include "io/image_io.hpp"
+#include "mask_files.hpp"
 
 namespace penumbra::cli {
 namespace {
@@ -50,13 +52,10 @@ std::vector<std::string> scenes_in_list(const fs::path& list)
 
 // The format that the scene asks for; exr when it asks for none. A scene that cannot be read or asks for what does not exist gets exr here
 // and its error when its turn comes.
-std::string output_format(const std::string& scene)
+std::string output_format(const nlohmann::json& scene)
 {
     try {
-        const std::vector<std::byte> bytes = read_file(scene, scene);
-        const auto* text = reinterpret_cast<const char*>(bytes.data());
-        const auto json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
-        return checked({json.at("output").at("format").get<std::string>(), 0}, "").format;
+        return checked({scene.at("output").at("format").get<std::string>(), 0}, "").format;
     } catch (const Error&) {
     } catch (const nlohmann::json::exception&) {
     }
@@ -96,12 +95,17 @@ std::vector<BatchItem> batch_items(const std::string& source, const std::string&
     std::vector<BatchItem> items;
     std::map<std::string, std::string> writers;
     for (const std::string& scene : scenes) {
-        const std::string extension = format.empty() ? output_format(scene) : format;
-        const std::string output = (fs::path(folder) / (fs::path(scene).stem().string() + "." + extension)).string();
-        const auto [writer, is_new] = writers.emplace(output, scene);
-        if (!is_new)
-            throw Error(ErrorCode::usage, scene + " and " + writer->second + " would both write " + output, "give them different names");
-        items.push_back({scene, output});
+        const nlohmann::json json = json_in(scene);
+        const std::string extension = format.empty() ? output_format(json) : format;
+        BatchItem item{scene, (fs::path(folder) / (fs::path(scene).stem().string() + "." + extension)).string(), {}};
+        for (const MaskFile& mask : mask_files(item.output, json)) {
+            const auto [writer, is_new] = writers.emplace(mask.file, scene);
+            if (!is_new)
+                throw Error(ErrorCode::usage, scene + " and " + writer->second + " would both write " + mask.file,
+                            "give them different names");
+            item.outputs.push_back(mask.file);
+        }
+        items.push_back(std::move(item));
     }
     return items;
 }
@@ -115,9 +119,13 @@ std::vector<BatchItem> items_of(const Shard& shard, const std::vector<BatchItem>
 
 bool up_to_date(const BatchItem& item)
 {
-    std::error_code no_output, no_scene;
-    const auto output = fs::last_write_time(item.output, no_output), scene = fs::last_write_time(item.scene, no_scene);
-    return !no_output && !no_scene && output >= scene;
+    std::error_code no_scene;
+    const auto scene = fs::last_write_time(item.scene, no_scene);
+    return !no_scene && std::ranges::all_of(item.outputs, [&](const std::string& output) {
+        std::error_code no_output;
+        const auto written = fs::last_write_time(output, no_output);
+        return !no_output && written >= scene;
+    });
 }
 
 } // namespace penumbra::cli

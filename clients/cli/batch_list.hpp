@@ -9,7 +9,8 @@
 namespace penumbra::cli {
 
 struct BatchItem {
-    std::string scene, output; // paths
+    std::string scene, output;        // paths
+    std::vector<std::string> outputs; // of all its masks: of several lights, of a sequence; else `output` alone
 };
 
 // Part `number` of `count`, counted from 1.
@@ -28,7 +29,7 @@ std::vector<BatchItem> batch_items(const std::string& source, const std::string&
 // Every count-th item, starting at the shard's: neighbouring scenes, which often cost alike, spread over all shards.
 std::vector<BatchItem> items_of(const Shard& shard, const std::vector<BatchItem>& items);
 
-// The output is there and not older than its scene.
+// The outputs are there, all of them, and not older than their scene.
 bool up_to_date(const BatchItem& item);
 
 } // namespace penumbra::cli

@@ -9,6 +9,7 @@
 
 #include "files.hpp"
 #include "io/scene_file.hpp"
+#include "mask_files.hpp"
 #include "progress.hpp"
 #include "streams.hpp"
 #include "technique_flags.hpp"
@@ -26,8 +27,8 @@ struct Flags {
 
 constexpr const char* notes = R"(
 Writes DIR/front.exr, back.exr, layer_1.exr ..., receiver.exr: those that the technique needs and those that the scene has, as planar depth in
-scene units, float32, +infinity where nothing is; emission.exr for a textured light; and DIR/scene.json, which refers to them and gives the
-same mask. DIR is made when it is not there. What is in it under these names is replaced.
+scene units, float32, +infinity where nothing is; emission.exr for a textured light, emission.0001.exr ... for a sequence; of several lights
+front.NAME.exr and so on for each; and DIR/scene.json, which refers to them and gives the same masks. DIR is made when it is not there. What is in it under these names is replaced.
 
 Example:
   penumbra depth scene.json --out depth && penumbra mask depth/scene.json -o mask.exr)";
@@ -37,23 +38,42 @@ void write_depth(const fs::path& path, const DepthMap& map)
     write_image(path.string(), Image{map.width, map.height, 1, map.depth}, {"exr", 32});
 }
 
+// Writes the images of one light that are there and returns their names, which have `.<light>` in them for one of several.
+LightNames write_light_images(const Light& light, const Occluders& occluders, const std::string& of, const fs::path& folder)
+{
+    const auto named = [&](const std::string& stem, int frame = 0) { return mask_file(stem + ".exr", of, frame); };
+    const auto write = [&](const std::string& stem, const DepthMap& map) {
+        write_depth(folder / named(stem), map);
+        return named(stem);
+    };
+    LightNames names;
+    if (occluders.front) names.front = write("front", *occluders.front);
+    if (occluders.back) names.back = write("back", *occluders.back);
+    for (const DepthMap& layer : occluders.layers) names.layers.push_back(write("layer_" + std::to_string(names.layers.size() + 1), layer));
+    const auto* rectangle = std::get_if<RectangleLight>(&light);
+    if (!rectangle) return names;
+    if (rectangle->emission) {
+        names.emission = named("emission");
+        write_image((folder / names.emission).string(), *rectangle->emission, {"exr", 32});
+    }
+    for (const Image& frame : rectangle->frames) {
+        names.frames.push_back(named("emission", static_cast<int>(names.frames.size() + 1)));
+        write_image((folder / names.frames.back()).string(), frame, {"exr", 32});
+    }
+    return names;
+}
+
 // Writes the images that are there and returns their names.
 DepthNames write_images(const Scene& scene, const fs::path& folder)
 {
     DepthNames names;
-    const auto write = [&folder](const std::string& name, const DepthMap& map) {
-        write_depth(folder / name, map);
-        return name;
-    };
-    if (scene.occluders.front) names.front = write("front.exr", *scene.occluders.front);
-    if (scene.occluders.back) names.back = write("back.exr", *scene.occluders.back);
-    for (const DepthMap& layer : scene.occluders.layers)
-        names.layers.push_back(write("layer_" + std::to_string(names.layers.size() + 1) + ".exr", layer));
-    if (const auto* light = std::get_if<RectangleLight>(&scene.light); light && light->emission) {
-        names.emission = "emission.exr";
-        write_image((folder / names.emission).string(), *light->emission, {"exr", 32});
+    if (scene.lights.empty()) static_cast<LightNames&>(names) = write_light_images(scene.light, scene.occluders, {}, folder);
+    for (const SceneLight& light : scene.lights)
+        names.lights.push_back(write_light_images(light.light, *light.occluders, light.name, folder));
+    if (scene.receivers.depth) {
+        names.receiver = "receiver.exr";
+        write_depth(folder / names.receiver, *scene.receivers.depth);
     }
-    if (scene.receivers.depth) names.receiver = write("receiver.exr", *scene.receivers.depth);
     return names;
 }
 

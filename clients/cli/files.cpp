@@ -1,6 +1,7 @@
 #include "files.hpp"
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <system_error>
 #include <vector>
@@ -33,25 +34,35 @@ void require_different(const std::string& path, std::string_view flag, const std
         throw Error(ErrorCode::usage, std::string(flag) + " " + path + ": is the same file as " + std::string(other_flag) + " " + other);
 }
 
-void require_not_named_in(const std::string& scene, const std::string& path, std::string_view flag)
+nlohmann::json json_in(const std::string& scene)
 {
-    std::error_code ignored;
-    const fs::path target = fs::weakly_canonical(path, ignored), folder = fs::path(scene).parent_path();
-    if (!fs::exists(target, ignored)) return;
-
-    nlohmann::json json;
     try {
         const std::vector<std::byte> bytes = read_file(scene, scene);
         const auto* text = reinterpret_cast<const char*>(bytes.data());
-        json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+        nlohmann::json json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+        return json.is_discarded() ? nlohmann::json() : json;
     } catch (const Error&) {
-        return;
+        return {};
     }
-    if (json.is_discarded()) return;
+}
+
+void require_not_named_in(const std::string& scene, const nlohmann::json& json, const std::vector<std::string>& paths,
+                          std::string_view flag)
+{
+    std::error_code ignored;
+    std::map<fs::path, std::string> targets;
+    for (const std::string& path : paths)
+        if (fs::exists(path, ignored)) targets.emplace(fs::weakly_canonical(path, ignored), path);
+    if (targets.empty() || !json.is_structured()) return;
+
+    const fs::path folder = fs::path(scene).parent_path();
     const nlohmann::json leaves = json.flatten();
     for (const auto& [key, value] : leaves.items()) {
-        if (!value.is_string() || fs::weakly_canonical(folder / value.get<std::string>(), ignored) != target) continue;
-        throw Error(ErrorCode::usage, std::string(flag) + " " + path + ": would replace what " + scene + " is made from (" + key + ")");
+        if (!value.is_string()) continue;
+        const auto found = targets.find(fs::weakly_canonical(folder / value.get<std::string>(), ignored));
+        if (found == targets.end()) continue;
+        throw Error(ErrorCode::usage,
+                    std::string(flag) + " " + found->second + ": would replace what " + scene + " is made from (" + key + ")");
     }
 }
 

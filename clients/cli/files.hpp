@@ -4,6 +4,9 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
@@ -17,9 +20,12 @@ void require_place_for(const std::string& path, std::string_view flag);
 // Throws usage when both name one file.
 void require_different(const std::string& path, std::string_view flag, const std::string& other, std::string_view other_flag);
 
-// No string in the scene file leads to `path`: results never replace what they are made from. Throws usage; a scene that cannot be read
-// passes, its own error comes later.
-void require_not_named_in(const std::string& scene, const std::string& path, std::string_view flag);
+// The scene file's JSON; null for what cannot be read, the error of which comes when it is loaded.
+nlohmann::json json_in(const std::string& scene);
+
+// No string in the scene's JSON leads to one of `paths`: results never replace what they are made from. Throws usage.
+void require_not_named_in(const std::string& scene, const nlohmann::json& json, const std::vector<std::string>& paths,
+                          std::string_view flag);
 
 // How to write an image to `path`: the format of its extension; the bits of `wanted` where that is for the same format. Throws usage.
 OutputFormat format_for(const std::string& path, const OutputFormat& wanted, std::string_view flag);

@@ -1,4 +1,5 @@
-// penumbra mask: one scene, one mask.
+// penumbra mask: one scene; one mask, or those of its lights and frames.
+#include <algorithm>
 #include <future>
 #include <memory>
 
@@ -8,9 +9,11 @@
 #include <penumbra/scene.hpp>
 
 #include "files.hpp"
+#include "mask_files.hpp"
 #include "opencl/quirks.hpp"
 #include "progress.hpp"
 #include "remote.hpp"
+#include "scene/lights.hpp"
 #include "streams.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
@@ -20,6 +23,7 @@ namespace {
 
 struct Flags {
     std::string scene, mask, report, device, server;
+    MaskChoice choice;
     TechniqueFlags technique;
 };
 
@@ -29,6 +33,9 @@ Examples:
   penumbra mask scene.json -o mask.png --technique soft_shadow_map --set sides=both
   penumbra mask scene.json -o mask.exr --report report.json --device 0
   penumbra mask scene.json -o mask.exr --server http://127.0.0.1:8080
+
+Of several lights MASK is that of all together, and mask.NAME.exr of each; of a sequence of emission images every frame has its own,
+mask.0001.exr, mask.NAME.0001.exr. --light and --frame choose one, which goes to MASK.
 
 Masks are visibility: 1 fully lit, 0 umbra, linear. Warnings go to standard error.
 A server that asks for a token gets the one in PENUMBRA_SERVER_TOKEN.)";
@@ -42,28 +49,48 @@ void write_report(const Flags& flags, const std::string& report)
     }
 }
 
-int run_on_server(const Flags& flags)
+int run_on_server(const Flags& flags, const std::vector<MaskFile>& files)
 {
     if (!flags.device.empty()) throw Error(ErrorCode::usage, "--device " + flags.device + ": with --server, the server has the device");
-    const std::string report = mask_on_server({flags.server, flags.scene, flags.mask, flags.technique}, !flags.report.empty());
+    const std::string report = masks_on_server({flags.server, flags.scene, flags.technique}, files, !flags.report.empty());
     if (!flags.report.empty()) write_report(flags, report);
     return 0;
 }
 
-int run(const Flags& flags)
+// Refuses what the names of files say before anything is read or computed; gives the files to come.
+std::vector<MaskFile> check_files(const Flags& flags)
 {
-    // Refuse in order of cost: names, then the scene, then the device, then the work.
     require_place_for(flags.mask, "-o");
     require_different(flags.mask, "-o", flags.scene, "SCENE.json");
     format_for(flags.mask, {}, "-o");
     if (!flags.report.empty()) {
         require_place_for(flags.report, "--report");
         require_different(flags.report, "--report", flags.scene, "SCENE.json");
-        require_different(flags.report, "--report", flags.mask, "-o");
     }
+    const nlohmann::json json = json_in(flags.scene);
+    std::vector<MaskFile> files = mask_files(flags.mask, json, flags.choice);
+    std::vector<std::string> paths;
+    for (const MaskFile& file : files) {
+        paths.push_back(file.file);
+        if (file.file != flags.mask) require_different(file.file, "-o", flags.scene, "SCENE.json");
+        if (!flags.report.empty()) require_different(flags.report, "--report", file.file, "-o");
+    }
+    require_not_named_in(flags.scene, json, paths, "-o");
+    return files;
+}
 
-    require_not_named_in(flags.scene, flags.mask, "-o");
-    if (!flags.server.empty()) return run_on_server(flags);
+// The reports of all masks: as it always was for one, a list for more.
+std::string report_text(const std::vector<FileReport>& reports)
+{
+    const FileReport& first = reports.front();
+    return reports.size() == 1 && first.light.empty() && first.frame == 0 ? report_json(first.report) : reports_json(reports);
+}
+
+int run(const Flags& flags)
+{
+    // Refuse in order of cost: names, then the scene, then the device, then the work.
+    const std::vector<MaskFile> files = check_files(flags);
+    if (!flags.server.empty()) return run_on_server(flags, files);
 
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
     // is set first: nothing may read it meanwhile.
@@ -74,19 +101,31 @@ int run(const Flags& flags)
     progress.step("reading " + flags.scene);
     Scene scene = read_scene(flags.scene);
     const OutputFormat format = format_for(flags.mask, scene.output, "-o");
+    scene = in_scene(flags.scene, [&] { return chosen(std::move(scene), flags.choice); });
     scene.technique = in_scene(flags.scene, [&] { return apply(scene.technique, flags.technique); });
+    const Technique technique = technique_from(scene.technique);
 
     progress.step("opening the device");
     const Engine engine = opening.get();
 
+    std::vector<FileReport> reports;
+    std::vector<std::string> warnings;
     progress.step("computing the mask by " + scene.technique.kind);
-    const Mask mask = in_scene(flags.scene, [&] { return engine.mask(scene); });
-
-    progress.step("writing " + flags.mask);
-    write_image(flags.mask, mask.visibility, format);
+    const auto write = [&](NamedMask&& named) {
+        const std::string file = mask_file(flags.mask, named.light, named.frame);
+        progress.step("writing " + file);
+        write_image(file, named.mask.visibility, format);
+        // Those of each light come again, with its name, from all lights together.
+        if (named.light.empty())
+            for (const std::string& warning : named.mask.report.warnings)
+                if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
+        reports.push_back({named.light, named.frame, file, std::move(named.mask.report)});
+        progress.step("computing the next mask");
+    };
+    in_scene(flags.scene, [&] { engine.masks(scene, technique, write); });
     progress.end();
-    print_warnings(mask.report.warnings);
-    if (!flags.report.empty()) write_report(flags, report_json(mask.report));
+    print_warnings(warnings);
+    if (!flags.report.empty()) write_report(flags, report_text(reports));
     return 0;
 }
 
@@ -103,6 +142,10 @@ Verb mask_verb(CLI::App& program)
         ->required();
     add_technique_flags(*app, flags->technique);
     app->add_option("--report", flags->report, "stages with milliseconds, bytes, device, warnings")->option_text("REPORT.json");
+    app->add_option("--light", flags->choice.light, "of several lights, the mask of this one alone")->option_text("NAME");
+    app->add_option("--frame", flags->choice.frame, "of a sequence, the masks of this frame alone, from 1")
+        ->option_text("N")
+        ->check(CLI::Range(1, static_cast<int>(max_frames)));
     add_device_flag(*app, flags->device);
     app->add_option("--server", flags->server, "let a service compute it; the scene's files are sent along")->option_text("URL");
     app->footer([] { return technique_help() + examples; });

@@ -1,5 +1,6 @@
 #include "remote.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -51,7 +52,7 @@ void apply_flags(nlohmann::json& scene, const TechniqueFlags& flags)
     for (const auto& [name, value] : request.settings) std::visit([&](const auto& held) { technique[name] = held; }, value);
 }
 
-client::SceneFile read_for_upload(const RemoteMask& asked)
+client::SceneFile read_for_upload(const RemoteScene& asked)
 {
     return in_scene(asked.scene, [&] {
         const std::vector<std::byte> bytes = read_file(asked.scene, asked.scene);
@@ -67,7 +68,7 @@ client::SceneFile read_for_upload(const RemoteMask& asked)
 }
 
 // What the service said about the scene is about the scene; the rest is about the service.
-Error translated(const client::Error& error, const RemoteMask& asked)
+Error translated(const client::Error& error, const RemoteScene& asked)
 {
     const client::Problem& problem = error.problem();
     const std::string service = "--server " + asked.server + ": ";
@@ -86,8 +87,8 @@ Error translated(const client::Error& error, const RemoteMask& asked)
     }
 }
 
-std::string report_of(const client::Mask& mask, const client::Client& service, const nlohmann::json& scene, const RemoteMask& asked,
-                      double round_trip_ms)
+nlohmann::ordered_json report_of(const client::Mask& mask, const client::Client& service, const nlohmann::json& scene,
+                                 const RemoteScene& asked, const MaskFile& file, double round_trip_ms)
 {
     nlohmann::ordered_json report;
     const nlohmann::json technique = scene.value("technique", nlohmann::json{{"kind", TechniqueRequest().kind}});
@@ -98,7 +99,7 @@ std::string report_of(const client::Mask& mask, const client::Client& service, c
     for (const nlohmann::json& device : devices)
         if (device.value("selected", false))
             report["device"] = {{"name", device.value("name", "")}, {"driver", device.value("driver", "")}};
-    const Image image = decode_image(std::as_bytes(std::span(mask.bytes)), asked.mask);
+    const Image image = decode_image(std::as_bytes(std::span(mask.bytes)), file.file);
     report["resolution"] = {image.width, image.height};
     report["stages"] = nlohmann::ordered_json::array();
     for (const auto& [name, ms] : mask.stages_ms) report["stages"].push_back({{"name", name}, {"ms", ms}});
@@ -106,31 +107,52 @@ std::string report_of(const client::Mask& mask, const client::Client& service, c
     report["server"] = asked.server;
     report["request_id"] = mask.request_id;
     report["round_trip_ms"] = round_trip_ms;
-    return report.dump(2) + "\n";
+    return report;
+}
+
+// One mask, written; its report.
+nlohmann::ordered_json fetch(const client::Client& service, const client::SceneFile& scene, const RemoteScene& asked, const MaskFile& file,
+                             bool with_report, std::vector<std::string>& warnings)
+{
+    const auto begun = std::chrono::steady_clock::now();
+    const client::Mask mask =
+        service.mask(scene.scene, scene.images, {.format = format_of_mask(file.file), .light = file.light, .frame = file.frame});
+    const double round_trip_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count();
+    write_file(file.file, std::as_bytes(std::span(mask.bytes)));
+    for (const std::string& warning : mask.warnings)
+        if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
+    return with_report ? report_of(mask, service, scene.scene, asked, file, round_trip_ms) : nlohmann::ordered_json();
 }
 
 } // namespace
 
-std::string mask_on_server(const RemoteMask& asked, bool with_report)
+std::string masks_on_server(const RemoteScene& asked, const std::vector<MaskFile>& files, bool with_report)
 {
-    const client::Format format = format_of_mask(asked.mask);
+    format_of_mask(files.front().file);
     const char* token = std::getenv("PENUMBRA_SERVER_TOKEN");
     Progress progress;
     try {
         const client::Client service(asked.server, {.token = token ? token : "", .timeout = timeout, .traceparent = {}});
         progress.step("reading " + asked.scene);
-        const client::SceneFile file = read_for_upload(asked);
+        const client::SceneFile scene = read_for_upload(asked);
 
-        progress.step("computing the mask on " + asked.server);
-        const auto begun = std::chrono::steady_clock::now();
-        const client::Mask mask = service.mask(file.scene, file.images, {.format = format});
-        const double round_trip_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count();
-
-        progress.step("writing " + asked.mask);
-        write_file(asked.mask, std::as_bytes(std::span(mask.bytes)));
+        std::vector<std::string> warnings;
+        nlohmann::ordered_json reports = nlohmann::ordered_json::array();
+        for (const MaskFile& file : files) {
+            progress.step("computing " + file.file + " on " + asked.server);
+            nlohmann::ordered_json report = {{"light", file.light.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(file.light)},
+                                             {"frame", file.frame == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(file.frame)},
+                                             {"file", file.file}};
+            nlohmann::ordered_json one = fetch(service, scene, asked, file, with_report, warnings);
+            if (!with_report) continue;
+            if (files.size() == 1) report = nlohmann::ordered_json::object();
+            report.update(one);
+            reports.push_back(std::move(report));
+        }
         progress.end();
-        print_warnings(mask.warnings);
-        return with_report ? report_of(mask, service, file.scene, asked, round_trip_ms) : std::string();
+        print_warnings(warnings);
+        if (!with_report) return {};
+        return (files.size() == 1 ? reports[0] : nlohmann::ordered_json{{"masks", reports}}).dump(2) + "\n";
     } catch (const client::Error& error) {
         throw translated(error, asked);
     } catch (const std::invalid_argument& error) {

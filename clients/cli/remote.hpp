@@ -2,19 +2,22 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "mask_files.hpp"
 #include "technique_flags.hpp"
 
 namespace penumbra::cli {
 
-struct RemoteMask {
-    std::string server, scene, mask; // URL, files
+struct RemoteScene {
+    std::string server, scene; // URL, file
     TechniqueFlags technique;
 };
 
-// Sends the scene and the files that it names, writes the answer to `mask` as the service sent it, prints the warnings. Returns the
-// report's JSON: of the contract's keys those that an answer over HTTP has, and `server`, `request_id`, `round_trip_ms`; the resolution and
-// device only where `with_report`. The token is PENUMBRA_SERVER_TOKEN's. Throws Error.
-std::string mask_on_server(const RemoteMask& asked, bool with_report);
+// Sends the scene and the files that it names once for each mask, writes the answers as the service sent them, prints the warnings. Returns
+// the report's JSON: of the contract's keys those that an answer over HTTP has, and `server`, `request_id`, `round_trip_ms`; the resolution
+// and device only where `with_report`; for more than one mask {"masks": [...]}, as reports_json. The token is PENUMBRA_SERVER_TOKEN's.
+// Throws Error.
+std::string masks_on_server(const RemoteScene& asked, const std::vector<MaskFile>& files, bool with_report);
 
 } // namespace penumbra::cli

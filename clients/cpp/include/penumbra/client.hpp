@@ -10,7 +10,9 @@
 //     for (double half : {0.1, 0.2, 0.5}) kept.mask({{"light", {{"half_u", {half, 0, 0}}, {"half_v", {0, 0, -half}}}}});
 #pragma once
 
+#include <algorithm>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +39,8 @@ struct Mask {
 struct MaskOptions {
     Format format = Format::pfm;
     const Mask* previous = nullptr; // a mask from before: copied when the service says that the answer would be the same
+    std::string light = {};         // of a scene with `lights`, the name of one; empty: all together
+    int frame = 0;                  // of a scene with a sequence, its number from 1; 0: there is none
 };
 
 namespace detail {
@@ -120,8 +124,22 @@ inline nlohmann::json json_from(const httplib::Response& answer)
     return json;
 }
 
-inline Mask ask_mask(const Transport& transport, const std::string& path, const Body& body, const MaskOptions& options)
+// "?light=NAME&frame=N", of what is asked for.
+inline std::string query_of(const MaskOptions& options)
 {
+    const auto fits = [](char c) {
+        return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+    };
+    if (!std::ranges::all_of(options.light, fits)) throw std::invalid_argument("light: expected a name of A-Z a-z 0-9 _ -");
+    if (options.frame < 0) throw std::invalid_argument("frame: is " + std::to_string(options.frame) + ", expected 1 or more");
+    std::string query = options.light.empty() ? std::string() : "?light=" + options.light;
+    if (options.frame > 0) query += (query.empty() ? "?frame=" : "&frame=") + std::to_string(options.frame);
+    return query;
+}
+
+inline Mask ask_mask(const Transport& transport, const std::string& base, const Body& body, const MaskOptions& options)
+{
+    const std::string path = base + query_of(options);
     httplib::Headers headers{{"Accept", media_type(options.format)}};
     const bool conditional = options.previous && !options.previous->etag.empty() && options.previous->format == options.format;
     if (!conditional) return mask_from(transport.ask("POST", path, &body, headers, {200}), options.format);
@@ -135,7 +153,7 @@ inline Mask ask_mask(const Transport& transport, const std::string& path, const 
 // A scene that the service keeps for a time, renewed by each use. When it was forgotten it is uploaded again by itself.
 class KeptScene {
 public:
-    // The mask of the kept scene with `patch` merged into it for this request only (JSON Merge Patch, RFC 7396: the sections light,
+    // The mask of the kept scene with `patch` merged into it for this request only (JSON Merge Patch, RFC 7396: the sections light, lights,
     // receivers, technique, output; one with another kind replaces the kept one). `images` add to the kept ones or replace them.
     Mask mask(const nlohmann::json& patch = nlohmann::json::object(), const Images& images = {}, const MaskOptions& options = {})
     {

@@ -22,32 +22,57 @@ struct SceneFile {
 
 namespace detail {
 
-// Every value of a scene that names a file. What is no text where a name belongs is left to the service to refuse.
-inline std::vector<nlohmann::json*> file_names(nlohmann::json& scene)
-{
-    std::vector<nlohmann::json*> names;
-    const auto member = [](nlohmann::json* value, const char* key) -> nlohmann::json* {
+// The values of a scene that name files, found one section after the other. What is no text where a name belongs is left to the service to
+// refuse.
+class FileNames {
+public:
+    explicit FileNames(nlohmann::json& scene)
+    {
+        add_light(member(&scene, "light"));
+        each(member(&scene, "lights"), [&](nlohmann::json& light) { add_light(&light); });
+        add_occluders(&scene);
+        add(member(member(&scene, "receivers"), "depth"));
+        each(member(&scene, "objects"), [&](nlohmann::json& object) {
+            add(member(&object, "mesh"));
+            add(member(&object, "depth"));
+        });
+    }
+    const std::vector<nlohmann::json*>& found() const { return found_; }
+
+private:
+    static nlohmann::json* member(nlohmann::json* value, const char* key)
+    {
         if (!value || !value->is_object()) return nullptr;
         const auto found = value->find(key);
         return found == value->end() ? nullptr : &*found;
-    };
-    const auto add = [&](nlohmann::json* value) {
-        if (value && value->is_string()) names.push_back(value);
-    };
-    add(member(member(&scene, "light"), "emission"));
-    nlohmann::json* depth = member(member(&scene, "occluders"), "depth");
-    add(member(depth, "front"));
-    add(member(depth, "back"));
-    if (nlohmann::json* layers = member(depth, "layers"); layers && layers->is_array())
-        for (nlohmann::json& layer : *layers) add(&layer);
-    add(member(member(&scene, "receivers"), "depth"));
-    if (nlohmann::json* objects = member(&scene, "objects"); objects && objects->is_array())
-        for (nlohmann::json& object : *objects) {
-            add(member(&object, "mesh"));
-            add(member(&object, "depth"));
-        }
-    return names;
-}
+    }
+    template <class Visit> static void each(nlohmann::json* list, Visit visit)
+    {
+        if (!list || !list->is_array()) return;
+        for (nlohmann::json& element : *list) visit(element);
+    }
+    void add(nlohmann::json* value)
+    {
+        if (value && value->is_string()) found_.push_back(value);
+    }
+    // A light's emission is an image or a list of them; one of several may have occluders.
+    void add_light(nlohmann::json* light)
+    {
+        nlohmann::json* emission = member(light, "emission");
+        add(emission);
+        each(emission, [&](nlohmann::json& frame) { add(&frame); });
+        add_occluders(light);
+    }
+    void add_occluders(nlohmann::json* holder)
+    {
+        nlohmann::json* depth = member(member(holder, "occluders"), "depth");
+        add(member(depth, "front"));
+        add(member(depth, "back"));
+        each(member(depth, "layers"), [&](nlohmann::json& layer) { add(&layer); });
+    }
+
+    std::vector<nlohmann::json*> found_;
+};
 
 // A name for a part that is not taken: the file's own, with what the service does not allow replaced by _. At most 120 characters, so that
 // a number still fits into the 128 that the service allows; the end stays, as it decides a mesh's format.
@@ -74,7 +99,8 @@ inline Images take_files(nlohmann::json& scene, const std::filesystem::path& fol
 {
     Images images;
     std::map<std::string, std::string> names; // by the file's real path
-    for (nlohmann::json* value : detail::file_names(scene)) {
+    const detail::FileNames named(scene);
+    for (nlohmann::json* value : named.found()) {
         const std::filesystem::path file = folder / value->get<std::string>();
         std::error_code ignored;
         std::string& name = names[std::filesystem::weakly_canonical(file, ignored).string()];
