@@ -11,6 +11,7 @@
 #include "problem.hpp"
 #include "resources.hpp"
 #include "scene/light_space.hpp"
+#include "scene/lights.hpp"
 #include "scene_patch.hpp"
 
 namespace penumbra::server {
@@ -31,6 +32,22 @@ std::vector<Part> views(const std::vector<std::pair<std::string, std::string>>& 
 }
 
 std::uint64_t depth_bytes(const std::optional<DepthMap>& map) { return map ? map->depth.size() * sizeof(float) : 0; }
+
+std::uint64_t depth_bytes(const Occluders& occluders)
+{
+    std::uint64_t bytes = depth_bytes(occluders.front) + depth_bytes(occluders.back);
+    for (const DepthMap& layer : occluders.layers) bytes += layer.depth.size() * sizeof(float);
+    return bytes;
+}
+
+std::uint64_t emission_bytes(const Light& light)
+{
+    const auto* rectangle = std::get_if<RectangleLight>(&light);
+    if (!rectangle) return 0;
+    std::uint64_t samples = rectangle->emission ? rectangle->emission->pixels.size() : 0;
+    for (const Image& frame : rectangle->frames) samples += frame.pixels.size();
+    return samples * sizeof(float);
+}
 
 bool is_directional(const Light& light) { return std::holds_alternative<DirectionalLight>(light); }
 
@@ -56,14 +73,15 @@ struct KeptScene::Changes {
         if ((a == before.end()) != (b == after.end())) return false;
         return a == before.end() || (*a == *b && !mentions(*b, names));
     }
+    bool same_lights() const { return same("light") && same("lights"); }
     std::string text(const char* section) const { return after.contains(section) ? after[section].dump() : std::string(); }
 };
 
 KeptScene::KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline)
-    : id_(std::move(id)), owned_(copied(parts)), parts_(views(owned_)), scene_(decode_scene(parts_, options, deadline)),
-      occluders_(std::make_shared<const Occluders>(std::move(scene_.occluders))),
-      receivers_(std::make_shared<const Receivers>(std::move(scene_.receivers))),
-      geometry_(std::move(scene_.objects), light_frame(scene_.light).origin)
+    : id_(std::move(id)), owned_(copied(parts)), parts_(views(owned_)),
+      scene_(decode_scene(parts_, options, deadline)), first_choice_{.light = {}, .frame = frame_count(scene_) > 0 ? 1 : 0},
+      lights_(lights_of(scene_)), receivers_(std::make_shared<const Receivers>(std::move(scene_.receivers))),
+      geometry_(std::move(scene_.objects), light_frame(lights_->list.front().light).origin), cache_(lights_->list.size())
 {
     document_ = parse_json(find_scene(parts_, options)->bytes);
 }
@@ -72,8 +90,8 @@ std::uint64_t KeptScene::bytes() const
 {
     std::uint64_t bytes = geometry_.bytes() + cache_.host_bytes() + cache_.device_bytes();
     for (const auto& [name, part] : owned_) bytes += name.size() + part.size();
-    bytes += depth_bytes(occluders_->front) + depth_bytes(occluders_->back) + depth_bytes(receivers_->depth);
-    for (const DepthMap& layer : occluders_->layers) bytes += layer.depth.size() * sizeof(float);
+    bytes += depth_bytes(*lights_->shared) + depth_bytes(receivers_->depth);
+    for (const Lights::One& light : lights_->list) bytes += emission_bytes(light.light) + (light.own ? depth_bytes(*light.own) : 0);
     return bytes;
 }
 
@@ -93,12 +111,68 @@ void KeptScene::check_objects(const Changes& changes) const
     if (mentions(*objects, changes.names))
         throw Error(ErrorCode::invalid_input, "objects: name a part that came with this request, and objects are kept as they are",
                     "give the part another name, or upload the scene anew");
-    if (!changes.same("light") && objects_follow_light(changes.after))
+    if (!changes.same_lights() && objects_follow_light(changes.after))
         throw Error(ErrorCode::invalid_input, "light: cannot be changed: the depth of an object is seen from the light itself",
                     "give that object a camera of kind pinhole, or upload the scene anew");
 }
 
-MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const Options& options, const Deadline& deadline) const
+std::shared_ptr<const KeptScene::Lights> KeptScene::lights_of(Scene& scene)
+{
+    Lights lights;
+    if (scene.lights.empty()) lights.list.push_back({.name = {}, .weight = 1, .light = std::move(scene.light), .own = nullptr});
+    for (SceneLight& light : scene.lights) {
+        auto own = light.occluders ? std::make_shared<const Occluders>(std::move(*light.occluders)) : nullptr;
+        lights.list.push_back({.name = light.name, .weight = light.weight, .light = std::move(light.light), .own = std::move(own)});
+    }
+    lights.shared = std::make_shared<const Occluders>(std::move(scene.occluders));
+    return std::make_shared<const Lights>(std::move(lights));
+}
+
+std::shared_ptr<const KeptScene::Lights> KeptScene::patched_lights(const Changes& changes, const JsonObject& root,
+                                                                   const Resources& resources, std::vector<std::string>& warnings) const
+{
+    Scene scene;
+    parse_lights(root, resources, scene);
+    const bool listed = !scene.lights.empty() || document_.contains("lights");
+    // A light's camera reads differently for a directional light.
+    const bool same_cameras = is_directional(scene.light) == is_directional(lights_->list.front().light);
+    const bool same_occluders = !listed && changes.same("occluders") && (same_cameras || !root.has("occluders"));
+    if (!same_occluders) parse_all_occluders(root, resources, scene);
+    warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
+    Lights lights = *lights_of(scene);
+    if (same_occluders) lights.shared = lights_->shared;
+    return std::make_shared<const Lights>(std::move(lights));
+}
+
+// What came with this request alone has no name that would say what it was.
+std::vector<TaskLight> KeptScene::chosen(const Changes& changes, const Lights& lights, bool same_occluders, const MaskChoice& choice)
+{
+    std::vector<Choosable> choosable;
+    for (const Lights::One& light : lights.list) choosable.push_back({light.name, static_cast<int>(frames_of(light.light))});
+    std::vector<TaskLight> result;
+    for (const std::size_t i : chosen_from(choosable, choice)) {
+        const Lights::One& light = lights.list[i];
+        const nlohmann::json& json = light.name.empty() ? changes.after["light"] : changes.after["lights"][i];
+        TaskLight task{.name = light.name,
+                       .weight = light.weight,
+                       .place = i,
+                       .own_occluders = light.own != nullptr,
+                       .light = at_frame(light.light, choice.frame),
+                       .occluders = light.own ? light.own : lights.shared,
+                       .key = json.dump() + '\n' + changes.text("technique"),
+                       .still_key = {}};
+        if (!same_occluders || mentions(json, changes.names)) task.key.clear();
+        if (choosable[i].frames > 0 && !task.key.empty()) {
+            task.still_key = task.key;
+            task.key += "\nframe " + std::to_string(choice.frame);
+        }
+        result.push_back(std::move(task));
+    }
+    return result;
+}
+
+MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
+                         const Deadline& deadline) const
 {
     const nlohmann::json after = patch.empty() ? document_ : patched(document_, parse_json(patch));
     Changes changes{document_, after, {}};
@@ -109,39 +183,34 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
     std::vector<Part> parts(extra.begin(), extra.end());
     parts.insert(parts.end(), parts_.begin(), parts_.end());
     const RequestResources resources(parts, options, deadline);
-    MaskTask task{.light = scene_.light,
-                  .occluders = occluders_,
+    MaskTask task{.lights = {},
                   .receivers = receivers_,
                   .geometry = geometry_,
                   .technique = technique_from(scene_.technique),
                   .output = scene_.output,
                   .warnings = scene_.warnings,
                   .cache = &cache_,
-                  .prepared_key = changes.text("light") + '\n' + changes.text("technique"),
                   .receivers_key = changes.text("receivers")};
     resources.without_paths([&] {
         const JsonObject root(JsonValue(after, {}));
         if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
         if (!changes.same("technique"))
             task.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
-        if (!changes.same("light")) task.light = parse_light(root.need("light"), resources);
 
-        // A light's camera reads differently for a directional light.
-        const bool same_cameras = is_directional(task.light) == is_directional(scene_.light);
-        const bool same_occluders = changes.same("occluders") && (same_cameras || !root.has("occluders"));
-        if (!same_occluders)
-            task.occluders =
-                std::make_shared<const Occluders>(parse_occluders(root.need("occluders"), task.light, resources, task.warnings));
+        const bool same_lights = changes.same_lights() && changes.same("occluders");
+        const auto lights = same_lights ? lights_ : patched_lights(changes, root, resources, task.warnings);
+        const Light& first = lights->list.front().light;
+        const bool same_cameras = is_directional(first) == is_directional(lights_->list.front().light);
+        check_shared_views(root);
         if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
             task.receivers = std::make_shared<const Receivers>(
-                root.has("receivers") ? parse_receivers(root.need("receivers"), task.light, resources, task.warnings) : Receivers{});
+                root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.warnings) : Receivers{});
 
-        // What came with this request alone has no name that would say what it was.
-        if (!same_occluders || mentions(after["light"], changes.names)) task.prepared_key.clear();
+        task.lights = chosen(changes, *lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice);
         if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
         // Seen from the light, or fitted by it, the receivers depend on it.
         if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
-            task.receivers_key += '\n' + changes.text("light");
+            task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
     });
     return task;
 }

@@ -13,6 +13,8 @@
 #include <penumbra/engine.hpp>
 
 #include "gate.hpp"
+#include "io/json_value.hpp"
+#include "io/scene_file.hpp"
 #include "mask_cache.hpp"
 #include "masks.hpp"
 #include "multipart.hpp"
@@ -40,19 +42,39 @@ public:
 
     // What to compute a mask from: the scene with `patch` (scene_patch.hpp), an empty one to take it as it stands. The images that the
     // patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.
-    MaskTask task(std::string_view patch, std::span<const Part> extra, const Options& options, const Deadline& deadline) const;
+    MaskTask task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
+                  const Deadline& deadline) const;
+
+    // All lights together, in the first frame where there is a sequence: what is prepared when the scene is kept.
+    const MaskChoice& first_choice() const { return first_choice_; }
 
 private:
     // What decides whether a kept piece still holds.
     struct Changes;
+    // The scene's only light, or those of its list; and the occluders of those that have none of their own.
+    struct Lights {
+        struct One {
+            std::string name; // empty: the only one
+            double weight = 1;
+            Light light;
+            std::shared_ptr<const Occluders> own; // may be null
+        };
+        std::vector<One> list;
+        std::shared_ptr<const Occluders> shared;
+    };
+    static std::shared_ptr<const Lights> lights_of(Scene& scene);
     void check_objects(const Changes& changes) const;
+    std::shared_ptr<const Lights> patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
+                                                 std::vector<std::string>& warnings) const;
+    static std::vector<TaskLight> chosen(const Changes& changes, const Lights& lights, bool same_occluders, const MaskChoice& choice);
 
     const std::string id_;
     std::vector<std::pair<std::string, std::string>> owned_; // names and bytes of the parts
     std::vector<Part> parts_;                                // views of owned_
     nlohmann::json document_;
     Scene scene_; // decoded; without what the pointers below hold
-    std::shared_ptr<const Occluders> occluders_;
+    MaskChoice first_choice_;
+    std::shared_ptr<const Lights> lights_;
     std::shared_ptr<const Receivers> receivers_;
     Geometry geometry_;
     mutable MaskCache cache_;

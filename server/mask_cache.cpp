@@ -1,6 +1,7 @@
 #include "mask_cache.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include "engine/state.hpp"
 
@@ -34,7 +35,7 @@ std::optional<Prepared> MaskCache::prepared(const std::string& key)
 void MaskCache::keep(const std::string& key, const Prepared& prepared)
 {
     const std::scoped_lock lock(mutex_);
-    put(prepared_, key, prepared, most);
+    put(prepared_, key, prepared, most_);
 }
 
 std::shared_ptr<const Receivers> MaskCache::receivers(const std::string& key)
@@ -47,7 +48,7 @@ std::shared_ptr<const Receivers> MaskCache::receivers(const std::string& key)
 void MaskCache::keep(const std::string& key, std::shared_ptr<const Receivers> receivers)
 {
     const std::scoped_lock lock(mutex_);
-    put(receivers_, key, std::move(receivers), most);
+    put(receivers_, key, std::move(receivers), most_);
 }
 
 void MaskCache::clear()
@@ -69,9 +70,12 @@ std::uint64_t MaskCache::host_bytes() const
 std::uint64_t MaskCache::device_bytes() const
 {
     const std::scoped_lock lock(mutex_);
+    // Frames of a sequence share some of what they hold.
+    std::set<const opencl::MemoryMeter*> meters;
+    for (const auto& [key, prepared] : prepared_) meters.insert({prepared.state().memory.get(), prepared.state().shared.get()});
     std::uint64_t bytes = 0;
-    for (const auto& [key, prepared] : prepared_)
-        if (prepared.state().memory) bytes += prepared.state().memory->live;
+    for (const opencl::MemoryMeter* meter : meters)
+        if (meter) bytes += meter->live;
     return bytes;
 }
 

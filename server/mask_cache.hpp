@@ -1,6 +1,7 @@
 // What was made on the way to the last masks of one scene, so that the next one starts from it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <list>
@@ -18,6 +19,7 @@ namespace penumbra::server {
 // several threads at once.
 class MaskCache {
 public:
+    explicit MaskCache(std::size_t lights) : most_(4 * std::max<std::size_t>(lights, 1)) {}
     std::optional<Prepared> prepared(const std::string& key);
     void keep(const std::string& key, const Prepared& prepared);
     std::shared_ptr<const Receivers> receivers(const std::string& key);
@@ -27,7 +29,7 @@ public:
     std::uint64_t host_bytes() const, device_bytes() const;
 
 private:
-    static constexpr std::size_t most = 4; // of each: a few techniques side by side, as a comparison needs
+    const std::size_t most_; // of each: a few techniques side by side, as a comparison needs, for each light
     mutable std::mutex mutex_;
     std::list<std::pair<std::string, Prepared>> prepared_; // the last used in front
     std::list<std::pair<std::string, std::shared_ptr<const Receivers>>> receivers_;

@@ -12,16 +12,28 @@
 
 #include "gate.hpp"
 #include "mask_cache.hpp"
+#include "mask_choice.hpp"
 #include "mask_format.hpp"
 #include "multipart.hpp"
 #include "options.hpp"
 
 namespace penumbra::server {
 
-// What a mask is computed from, decoded. With a cache, prepared state and rendered receivers are looked up there first, under their keys.
-struct MaskTask {
+// One of the lights of a task, at the frame that was asked for. With a cache, what is prepared for it is looked up there first: under
+// `key`, which says the frame; of a light with a sequence then under `still_key`, for what all frames share. Empty keys are not kept.
+struct TaskLight {
+    std::string name; // empty: the scene has no `lights`
+    double weight = 1;
+    std::size_t place = 0; // in `lights`
+    bool own_occluders = false;
     Light light;
     std::shared_ptr<const Occluders> occluders;
+    std::string key, still_key;
+};
+
+// What a mask is computed from, decoded. With a cache, rendered receivers are looked up there first, under their key.
+struct MaskTask {
+    std::vector<TaskLight> lights; // at least one; of several the mask is that of all together
     std::shared_ptr<const Receivers> receivers;
     Geometry geometry;
     Technique technique;
@@ -29,7 +41,7 @@ struct MaskTask {
     std::vector<std::string> warnings;
 
     MaskCache* cache = nullptr;
-    std::string prepared_key, receivers_key;
+    std::string receivers_key;
 };
 
 struct StageTime {
@@ -53,19 +65,22 @@ const Part* find_scene(std::span<const Part> parts, const Options& options);
 Scene decode_scene(std::span<const Part> parts, const Options& options, const Deadline& deadline);
 
 // The task of a scene that came with its request.
-MaskTask task_of(std::span<const Part> parts, const Options& options, const Deadline& deadline);
+MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Options& options, const Deadline& deadline);
 
-// Prepares, or takes it from the task's cache. Throws Error and Problem.
-Prepared prepare(const Engine& engine, const MaskTask& task, const Deadline& deadline);
+// Prepares one of the task's lights, or takes it from the task's cache. Throws Error and Problem.
+Prepared prepare(const Engine& engine, const MaskTask& task, const TaskLight& light, const Deadline& deadline);
+
+// Prepares all of them, for the task's cache.
+void prepare_all(const Engine& engine, const MaskTask& task, const Deadline& deadline);
 
 // The deadline is checked between stages. `format`: what negotiate gave; bits are those of the scene's output when that names the same
 // format. Throws Error and Problem.
 MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFormat& format, const Options& options,
                        const Deadline& deadline);
 
-// A strong entity tag, quotes and all. `content` names all that was sent (id_of, KeptScene::content_of); the mask depends on that, on the
-// format, the program and the device.
-std::string etag_of(const Engine& engine, std::string_view content, const MaskFormat& format);
+// A strong entity tag, quotes and all. `content` names all that was sent (id_of, KeptScene::content_of); the mask depends on that, on which
+// of the scene's it is, on the format, the program and the device.
+std::string etag_of(const Engine& engine, std::string_view content, const MaskChoice& choice, const MaskFormat& format);
 
 // Whether an If-None-Match header names the tag (RFC 9110, 13.1.2; weak tags of the same text count).
 bool names_tag(std::string_view header, std::string_view tag);

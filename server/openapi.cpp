@@ -8,6 +8,7 @@
 #include "mask_format.hpp"
 #include "problem.hpp"
 #include "route.hpp"
+#include "scene/lights.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -46,7 +47,7 @@ Json body_of(const Route& route, const Options& options)
 {
     if (!route.path.ends_with("{id}/masks"))
         return {{"required", true}, {"content", content("multipart/form-data", form("a scene file, version 1", options, true))}};
-    const char* const patch = "a JSON Merge Patch (RFC 7396) of light, receivers, technique and output";
+    const char* const patch = "a JSON Merge Patch (RFC 7396) of light, lights, receivers, technique and output";
     Json types = content("application/json", {{"type", "object"}, {"description", patch}});
     types.update(content("application/merge-patch+json", {{"type", "object"}, {"description", patch}}));
     types.update(content("multipart/form-data", form(patch, options, false)));
@@ -107,9 +108,21 @@ Json responses_of(const Route& route)
 Json operation_of(const Route& route, const Options& options)
 {
     Json operation = {{"summary", route.summary}};
+    Json parameters = Json::array();
     if (route.path.find("{id}") != std::string_view::npos)
-        operation["parameters"] = Json::array(
-            {{{"name", "id"}, {"in", "path"}, {"required", true}, {"schema", {{"type", "string"}, {"pattern", "^[0-9a-f]{64}$"}}}}});
+        parameters.push_back(
+            {{"name", "id"}, {"in", "path"}, {"required", true}, {"schema", {{"type", "string"}, {"pattern", "^[0-9a-f]{64}$"}}}});
+    if (route.answer == Answer::mask) {
+        parameters.push_back({{"name", "light"},
+                              {"in", "query"},
+                              {"description", "of a scene with `lights`, the name of one; without it the mask of all together"},
+                              {"schema", {{"type", "string"}, {"pattern", "^[A-Za-z0-9_-]{1,64}$"}}}});
+        parameters.push_back({{"name", "frame"},
+                              {"in", "query"},
+                              {"description", "of a scene with a sequence of emission images, the number of one, from 1; needed there"},
+                              {"schema", {{"type", "integer"}, {"minimum", 1}, {"maximum", max_frames}}}});
+    }
+    if (!parameters.empty()) operation["parameters"] = parameters;
     if (route.method == "POST") operation["requestBody"] = body_of(route, options);
     operation["responses"] = responses_of(route);
     if (route.open || options.token.empty()) operation["security"] = Json::array();

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::string_view, 4> sections{"light", "receivers", "technique", "output"};
+constexpr std::array<std::string_view, 5> sections{"light", "lights", "receivers", "technique", "output"};
 
 // RFC 7396, but for objects of another kind.
 void merge(Json& target, const Json& patch)
@@ -39,7 +39,7 @@ Json patched(const Json& scene, const Json& patch)
     for (const auto& [key, value] : patch.items())
         if (std::ranges::find(sections, key) == sections.end())
             throw Error(ErrorCode::invalid_input, in_quotes(key) + ": cannot be changed in a kept scene",
-                        "expected light, receivers, technique or output; for anything else upload the scene anew");
+                        "expected light, lights, receivers, technique or output; for anything else upload the scene anew");
     Json result = scene;
     merge(result, patch);
     return result;

@@ -10,7 +10,8 @@
 namespace penumbra::server {
 
 // `scene` with `patch` merged in. A light, camera or technique whose `kind` differs from the one before replaces it instead: keys of one
-// kind mean nothing to another. Throws invalid_input for other sections than light, receivers, technique and output, naming them.
+// kind mean nothing to another. Lists, `lights` among them, are replaced whole. Throws invalid_input for other sections than light, lights,
+// receivers, technique and output, naming them.
 nlohmann::json patched(const nlohmann::json& scene, const nlohmann::json& patch);
 
 // Whether a string in `json`, at any depth, is one of `names`.

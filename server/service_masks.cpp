@@ -19,6 +19,8 @@ Problem no_scene()
     return Problem(404, "no_scene", "there is no scene of this id, or it is kept no longer; POST /v1/scenes keeps it again");
 }
 
+MaskChoice choice_of(const httplib::Request& request) { return choice_from({request.params.begin(), request.params.end()}); }
+
 // The id in the path, which the checks have looked at.
 std::string_view id_in(const httplib::Request& request)
 {
@@ -94,14 +96,15 @@ void Service::post_mask(const Request& request, Response& response)
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const MaskChoice choice = choice_of(request);
     const Body body = read_body(request);
     const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
-    const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), format); });
+    const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), choice, format); });
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
     const auto decoding = Deadline::Clock::now();
-    const MaskTask task = task_of(parts, options_, connection.request());
+    const MaskTask task = task_of(parts, choice, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;
     send_mask(response, task, format);
     tag.set_on(response);
@@ -121,10 +124,10 @@ void Service::post_scene(const Request& request, Response& response)
         const auto slot = enter_slot();
         const auto decoding = Deadline::Clock::now();
         scene = std::make_shared<KeptScene>(id, parts, options_, connection.request());
-        const MaskTask task = scene->task({}, {}, options_, connection.request());
+        const MaskTask task = scene->task({}, {}, scene->first_choice(), options_, connection.request());
         connection.cost.decode_ms = seconds_since(decoding) * 1000;
-        check_work(*task.occluders, *task.receivers, task.technique, options_);
-        prepare(engine_, task, connection.request());
+        check_work(task, options_);
+        prepare_all(engine_, task, connection.request());
         scenes_.keep(scene);
     }
     response.set_header("Location", "/v1/scenes/" + id);
@@ -138,6 +141,7 @@ void Service::post_kept_mask(const Request& request, Response& response)
     const auto scene = scenes_.find(id_in(request), true);
     if (!scene) throw no_scene();
     const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const MaskChoice choice = choice_of(request);
     const Body body = read_body(request);
     std::vector<Part> parts;
     std::string_view patch = body;
@@ -146,12 +150,12 @@ void Service::post_kept_mask(const Request& request, Response& response)
         const Part* const part = find_scene(parts, options_);
         patch = part ? part->bytes : std::string_view();
     }
-    const Tag tag(body.size(), [&] { return etag_of(engine_, scene->content_of(patch, parts), format); });
+    const Tag tag(body.size(), [&] { return etag_of(engine_, scene->content_of(patch, parts), choice, format); });
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
     const auto decoding = Deadline::Clock::now();
-    const MaskTask task = scene->task(patch, parts, options_, connection.request());
+    const MaskTask task = scene->task(patch, parts, choice, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;
     send_mask(response, task, format);
     tag.set_on(response);

@@ -32,16 +32,19 @@ void check_amount(std::string_view where, double amount, std::string_view what, 
 }
 
 struct WorkCheck {
-    const Occluders& occluders;
-    const Receivers& receivers;
+    const MaskTask& task;
     const Options& options;
-    double pixels() const { return static_cast<double>(receivers.width) * receivers.height; }
+    double pixels() const { return static_cast<double>(task.receivers->width) * task.receivers->height; }
+    double lights() const { return static_cast<double>(task.lights.size()); }
 
     void operator()(const ShadowMap&) const {}
     void operator()(const SoftShadowMap& settings) const
     {
-        const MapSize map = reduced_size(occluders.width, occluders.height, settings.resolution);
-        const double texels = static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
+        double texels = 0;
+        for (const TaskLight& light : task.lights) {
+            const MapSize map = reduced_size(light.occluders->width, light.occluders->height, settings.resolution);
+            texels += static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
+        }
         if (settings.project)
             check_pixels("technique.project_resolution", settings.project_resolution, settings.project_resolution, options.receivers);
         const double points = settings.project ? static_cast<double>(settings.project_resolution) * settings.project_resolution : pixels();
@@ -52,22 +55,33 @@ struct WorkCheck {
     {
         constexpr double met = 4096;
         const double parts = static_cast<double>(settings.light_splits) * settings.light_splits;
-        check_amount("technique.light_splits", parts * pixels() * met, "pairs of edge and receiver, at 4096 edges a receiver and part",
-                     options.pairs);
+        check_amount("technique.light_splits", parts * lights() * pixels() * met,
+                     "pairs of edge and receiver, at 4096 edges a receiver and part", options.pairs);
     }
     void operator()(const RayTraced& settings) const
     {
-        check_amount("technique.samples", pixels() * settings.samples, "rays", options.rays);
+        check_amount("technique.samples", lights() * pixels() * settings.samples, "rays", options.rays);
     }
 };
 
 } // namespace
 
-void check_work(const Occluders& occluders, const Receivers& receivers, const Technique& technique, const Options& options)
+void check_work(const MaskTask& task, const Options& options)
 {
+    const Receivers& receivers = *task.receivers;
     check_pixels("receivers.resolution", receivers.width, receivers.height, options.receivers);
-    check_pixels("occluders.resolution", occluders.width, occluders.height, options.image_samples);
-    std::visit(WorkCheck{occluders, receivers, options}, technique);
+    double texels = 0;
+    for (const TaskLight& light : task.lights) {
+        const Occluders& occluders = *light.occluders;
+        check_pixels("occluders.resolution", occluders.width, occluders.height, options.image_samples);
+        texels += static_cast<double>(occluders.width) * occluders.height;
+    }
+    if (task.lights.size() > 1) {
+        const double points = static_cast<double>(receivers.width) * receivers.height * static_cast<double>(task.lights.size());
+        check_amount("lights", points, "receivers, over all lights", options.receivers);
+        check_amount("lights", texels, "texels of occluder maps, over all lights", options.image_samples);
+    }
+    std::visit(WorkCheck{task, options}, task.technique);
 }
 
 } // namespace penumbra::server

@@ -84,8 +84,9 @@ const std::vector<std::unique_ptr<KeptScene>>& kept_scenes()
 
 void check_task(const KeptScene& scene, std::string_view patch, std::span<const Part> extra)
 {
-    const MaskTask task = scene.task(patch, extra, options(), Deadline(std::chrono::hours(1)));
-    expect(task.occluders && task.receivers, "a task without occluders or receivers");
+    const MaskTask task = scene.task(patch, extra, scene.first_choice(), options(), Deadline(std::chrono::hours(1)));
+    expect(!task.lights.empty() && task.receivers, "a task without lights or receivers");
+    for (const TaskLight& light : task.lights) expect(light.occluders != nullptr, "a light without occluders");
     if (const auto& depth = task.receivers->depth)
         expect(depth->width == task.receivers->width && depth->height == task.receivers->height,
                "receivers of another size than their depth");
