@@ -45,6 +45,21 @@ TEST_F(SceneFiles, EveryPlaceThatNamesAFile)
     EXPECT_EQ(file.images, expected);
 }
 
+TEST_F(SceneFiles, LightsAndFramesNameFilesToo)
+{
+    client::Images expected;
+    for (const std::string name : {"1.exr", "2.exr", "e.exr", "f.exr", "l.exr", "s.exr"}) {
+        expected[name] = "of " + name;
+        write(name, "of " + name);
+    }
+    const Json scene = Json::parse(R"({"lights": [{"emission": ["1.exr", "2.exr", "1.exr"]},
+        {"emission": "e.exr", "occluders": {"depth": {"front": "f.exr", "layers": ["l.exr"]}}}, 3],
+        "occluders": {"depth": {"front": "s.exr"}}})");
+    const client::SceneFile file = client::load_scene_file(write("scene.json", scene.dump()));
+    EXPECT_EQ(file.scene, scene);
+    EXPECT_EQ(file.images, expected);
+}
+
 TEST_F(SceneFiles, NamesThatClashAreToldApart)
 {
     for (const std::string name : {"a/x.exr", "b/x.exr", "scene", "c/x-2.exr"}) write(name, name);

@@ -292,6 +292,15 @@ def scenes():
         "penumbra": 1, "light": {"kind": "sphere", "center": [0, 6, 0], "radius": 0.5},
         "objects": [quad, {"depth": "depth.exr", "camera": view, "encoding": {"kind": "planar"}, "receives": True}, {"depth": "short.png", "camera": own}],
         "receivers": {"camera": view, "resolution": [8, 8]}, "technique": {"kind": "ray_traced"}}))
+    lights = [{**rectangle, "name": "fire", "emission": ["light.exr", "light.exr"], "occluders": {"camera": own, "depth": {"front": "depth.exr", "layers": ["depth.exr"]}}},
+              {"kind": "point", "center": [1, 6, 0], "weight": 0.5}]
+    put("scene", "lights.json", json.dumps({
+        "penumbra": 1, "lights": lights, "occluders": {"camera": own, "depth": {"front": "depth.exr"}},
+        "receivers": {"camera": placed, "depth": "depth.exr"}, "technique": {"kind": "ray_traced"}}))
+    put("scene", "frames.json", json.dumps({
+        "penumbra": 1, "light": {**rectangle, "emission": ["light.exr", "light.exr", "light.exr"]},
+        "occluders": {"camera": own, "depth": {"front": "depth.exr"}}, "receivers": {"camera": own, "depth": "depth.exr"}}))
+    put("patch", "lights.json", json.dumps({"lights": lights, "light": None, "receivers": {"camera": view}}))
     for technique, keys in techniques.items():
         put("patch", technique + ".json", json.dumps({"technique": {"kind": technique, **keys}}))
     put("patch", "light.json", json.dumps({"light": {"center": [1, 6, 0]}}))

@@ -28,6 +28,12 @@ constexpr std::array documents{
         "technique": {"kind": "ray_traced"}})",
     R"({"penumbra": 1, "light": {"kind": "sphere", "center": [0, 6, 0], "radius": 1},
         "objects": [{"depth": "depth.exr", "camera": {"kind": "light", "tan_half_fov": [0.5, 0.5]}}], "technique": {"kind": "ray_traced"}})",
+    R"({"penumbra": 1, "lights": [{"kind": "sphere", "center": [0, 6, 0], "radius": 1, "name": "lamp"},
+        {"kind": "rectangle", "center": [0, 6, 0], "half_u": [0.5, 0, 0], "half_v": [0, 0, -0.5], "weight": 2,
+         "emission": ["light.exr", "light.exr"], "occluders": {"resolution": [8, 8]}}],
+        "objects": [{"quad": {"center": [0, 0, 0], "half_u": [4, 0, 0], "half_v": [0, 0, -4]}}],
+        "receivers": {"camera": {"kind": "pinhole", "eye": [0, 1, 5], "target": [0, 0, 0], "vertical_fov_deg": 60}, "resolution": [8, 8]},
+        "technique": {"kind": "ray_traced"}})",
 };
 
 bool mentions_kind(const Json& json)

@@ -32,12 +32,20 @@ void expect_size(const std::optional<DepthMap>& map, int width, int height)
     for (const float depth : map->depth) expect(depth > 0, "a depth that is not above 0");
 }
 
-void check_scene(const Scene& scene)
+void check_occluders(const Occluders& occluders)
 {
-    const Occluders& occluders = scene.occluders;
     expect_size(occluders.front, occluders.width, occluders.height);
     expect_size(occluders.back, occluders.width, occluders.height);
     for (const DepthMap& layer : occluders.layers) expect_size(layer, occluders.width, occluders.height);
+}
+
+void check_scene(const Scene& scene)
+{
+    check_occluders(scene.occluders);
+    for (const SceneLight& light : scene.lights)
+        if (light.occluders) check_occluders(*light.occluders);
+    fuzz::accepted([&] { only_frame(scene, frame_count(scene)); });
+    for (const SceneLight& light : scene.lights) only_light(scene, light.name);
     expect_size(scene.receivers.depth, scene.receivers.width, scene.receivers.height);
     for (const std::string& warning : scene.warnings) fuzz::expect_message(warning);
     for (const Object& object : scene.objects)
@@ -45,21 +53,39 @@ void check_scene(const Scene& scene)
             for (const std::uint32_t corner : triangle) expect(corner < object.mesh.positions.size(), "a triangle with a corner elsewhere");
 }
 
+// The names of a light's images, which are put among those of `images` with `prefix`.
+LightNames named(const Light& light, const Occluders& occluders, const std::string& prefix, Images& images)
+{
+    LightNames names;
+    const auto keep = [&](const std::string& name, const DepthMap& map) {
+        images.written[prefix + name] = encode_depth(map);
+        return prefix + name;
+    };
+    if (occluders.front) names.front = keep("front", *occluders.front);
+    if (occluders.back) names.back = keep("back", *occluders.back);
+    for (const DepthMap& layer : occluders.layers) names.layers.push_back(keep("layer" + std::to_string(names.layers.size()), layer));
+    const auto* rectangle = std::get_if<RectangleLight>(&light);
+    if (!rectangle) return names;
+    const auto keep_emission = [&](const std::string& name, const Image& image) {
+        images.written[prefix + name] = encode_image(image, {"exr", 32});
+        return prefix + name;
+    };
+    if (rectangle->emission) names.emission = keep_emission("emission", *rectangle->emission);
+    for (const Image& frame : rectangle->frames)
+        names.frames.push_back(keep_emission("frame" + std::to_string(names.frames.size()), frame));
+    return names;
+}
+
 // The scene as a file, its images among those of `images`.
 std::string written(const Scene& scene, Images& images)
 {
     DepthNames names;
-    const auto keep = [&](const std::string& name, const DepthMap& map) {
-        images.written[name] = encode_depth(map);
-        return name;
-    };
-    if (scene.occluders.front) names.front = keep("front", *scene.occluders.front);
-    if (scene.occluders.back) names.back = keep("back", *scene.occluders.back);
-    for (const DepthMap& layer : scene.occluders.layers) names.layers.push_back(keep("layer" + std::to_string(names.layers.size()), layer));
-    if (scene.receivers.depth) names.receiver = keep("receiver", *scene.receivers.depth);
-    if (const auto* light = std::get_if<RectangleLight>(&scene.light); light && light->emission) {
-        names.emission = "emission";
-        images.written[names.emission] = encode_image(*light->emission, {"exr", 32});
+    static_cast<LightNames&>(names) = named(scene.light, scene.occluders, {}, images);
+    for (const SceneLight& light : scene.lights)
+        names.lights.push_back(named(light.light, light.occluders.value_or(Occluders{}), light.name + ".", images));
+    if (scene.receivers.depth) {
+        names.receiver = "receiver";
+        images.written[names.receiver] = encode_depth(*scene.receivers.depth);
     }
     return write_scene(scene, names);
 }

@@ -24,6 +24,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     parser.add_argument("-o", "--output", metavar="MASK", required=True, help="its extension is the format: .exr .tif .png .pfm")
     parser.add_argument("--server", metavar="URL", default="http://127.0.0.1:8080", help="default: %(default)s")
     parser.add_argument("--timeout", metavar="SECONDS", type=float, default=60.0, help="for one whole attempt; default: %(default)s")
+    parser.add_argument("--light", metavar="NAME", help="of several lights this one; without it all together")
+    parser.add_argument("--frame", metavar="N", type=int, help="of a sequence this frame, from 1")
     options = parser.parse_args(arguments)
 
     try:
@@ -37,7 +39,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     except (OSError, ValueError) as error:
         return _fail(error, 2)
     try:
-        mask = client.mask(scene, images, format=format)
+        mask = client.mask(scene, images, format=format, light_name=options.light, frame=options.frame)
         for warning in mask.warnings:
             print(f"penumbra_client: warning: {warning}", file=sys.stderr)
         mask.save(options.output)

@@ -6,6 +6,7 @@ import json
 import os
 import ssl
 import tempfile
+import urllib.parse
 from dataclasses import dataclass, field
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
@@ -81,7 +82,8 @@ class Client:
         self.traceparent = traceparent
 
     def mask(self, scene: Mapping[str, Any], images: Optional[Mapping[str, ImageLike]] = None, *, format: str = "array",
-             previous: Optional[Mask] = None, traceparent: Optional[str] = None) -> Mask:
+             previous: Optional[Mask] = None, traceparent: Optional[str] = None, light_name: Optional[str] = None,
+             frame: Optional[int] = None) -> Mask:
         """The mask of a scene (a dict of the scene file's form, docs/scene_file.md).
 
         images    by the names that the scene gives them: paths or bytes of EXR, PNG, TIFF or PFM files, or float arrays
@@ -89,9 +91,12 @@ class Client:
                   `encoding` says otherwise
         format    "array" for pixels, or "pfm", "exr", "png", "tiff" for a file's bytes
         previous  a mask from before: returned itself when the service says that the answer would be the same
+        light_name, frame
+                  of a scene with `lights` one light's mask; without a name that of all together. Of a scene with a sequence of
+                  emission images that frame, from 1; needed there.
         """
         body = form([("scene", _json(scene))] + encode_parts(images))
-        return self._mask("/v1/masks", body, format, previous, traceparent)
+        return self._mask("/v1/masks" + _query(light_name, frame), body, format, previous, traceparent)
 
     def keep(self, scene: Mapping[str, Any], images: Optional[Mapping[str, ImageLike]] = None) -> "KeptScene":
         """Uploads a scene once, for many masks under changed lights, receivers or techniques."""
@@ -152,25 +157,27 @@ class KeptScene:
         self._upload = upload
         self._send()
 
-    def mask(self, *, light: Optional[Mapping[str, Any]] = None, receivers: Optional[Mapping[str, Any]] = None,
-             technique: Optional[Mapping[str, Any]] = None, output: Optional[Mapping[str, Any]] = None,
-             images: Optional[Mapping[str, ImageLike]] = None, format: str = "array", previous: Optional[Mask] = None,
-             traceparent: Optional[str] = None) -> Mask:
+    def mask(self, *, light: Optional[Mapping[str, Any]] = None, lights: Optional[Sequence[Mapping[str, Any]]] = None,
+             receivers: Optional[Mapping[str, Any]] = None, technique: Optional[Mapping[str, Any]] = None,
+             output: Optional[Mapping[str, Any]] = None, images: Optional[Mapping[str, ImageLike]] = None, format: str = "array",
+             previous: Optional[Mask] = None, traceparent: Optional[str] = None, light_name: Optional[str] = None,
+             frame: Optional[int] = None) -> Mask:
         """The mask of the kept scene with these sections changed, for this request only.
 
-        Each section is merged into the kept one (JSON Merge Patch: keys replace, None removes a key); one with another `kind` replaces it.
-        `images` add to the kept ones or replace them; the rest is as in Client.mask.
+        Each section is merged into the kept one (JSON Merge Patch: keys replace, None removes a key); one with another `kind` replaces it,
+        and the list `lights` is replaced whole. `images` add to the kept ones or replace them; the rest is as in Client.mask.
         """
-        given = {"light": light, "receivers": receivers, "technique": technique, "output": output}
+        given = {"light": light, "lights": lights, "receivers": receivers, "technique": technique, "output": output}
         patch = _json({key: value for key, value in given.items() if value is not None})
         body: Body = form([("scene", patch)] + encode_parts(images)) if images else (patch, "application/merge-patch+json")
+        query = _query(light_name, frame)
         try:
-            return self._client._mask(f"/v1/scenes/{self.id}/masks", body, format, previous, traceparent)
+            return self._client._mask(f"/v1/scenes/{self.id}/masks{query}", body, format, previous, traceparent)
         except NotFound as error:
             if error.reason != "no_scene":
                 raise
         self._send()
-        return self._client._mask(f"/v1/scenes/{self.id}/masks", body, format, previous, traceparent)
+        return self._client._mask(f"/v1/scenes/{self.id}/masks{query}", body, format, previous, traceparent)
 
     def forget(self) -> None:
         """Tells the service that it is needed no more. Not an error when it was forgotten already."""
@@ -193,6 +200,14 @@ class KeptScene:
         self.expires_s = float(kept.get("expires_s", 0))
         self.size_bytes = int(kept.get("bytes", 0))
         self.warnings = [str(warning) for warning in kept.get("warnings", [])]
+
+
+def _query(light_name: Optional[str], frame: Optional[int]) -> str:
+    given = {"light": light_name, "frame": frame}
+    if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int) or frame < 1):
+        raise ValueError(f"frame is {frame!r}, expected a number from 1")
+    query = urllib.parse.urlencode({key: value for key, value in given.items() if value is not None})
+    return "?" + query if query else ""
 
 
 def _json(value: Mapping[str, Any]) -> bytes:

@@ -54,18 +54,26 @@ def rename_files(scene: Scene, rename: Rename) -> None:
 
 
 def _places(scene: Scene) -> Iterable[Tuple[Any, Any]]:
-    light, occluders, receivers = (_section(scene, key) for key in ("light", "occluders", "receivers"))
-    depth = _section(occluders, "depth")
-    layers = depth.get("layers")
-    objects = scene.get("objects")
-    candidates: List[Tuple[Any, Any]] = [(light, "emission"), (depth, "front"), (depth, "back")]
-    if isinstance(layers, list):
-        candidates += [(layers, i) for i in range(len(layers))]
-    candidates.append((receivers, "depth"))
-    for item in objects if isinstance(objects, list) else []:
-        if isinstance(item, dict):
-            candidates += [(item, "mesh"), (item, "depth")]
+    lights = [_section(scene, "light")] + _objects(scene, "lights")
+    candidates: List[Tuple[Any, Any]] = []
+    for light in lights:
+        candidates += [(light, "emission")] + _elements(light, "emission")
+    for holder in lights + [scene]:
+        depth = _section(_section(holder, "occluders"), "depth")
+        candidates += [(depth, "front"), (depth, "back")] + _elements(depth, "layers")
+    candidates.append((_section(scene, "receivers"), "depth"))
+    for item in _objects(scene, "objects"):
+        candidates += [(item, "mesh"), (item, "depth")]
     return [(holder, key) for holder, key in candidates if isinstance(holder, list) or key in holder]
+
+
+def _elements(holder: Scene, key: str) -> List[Tuple[Any, Any]]:
+    found = holder.get(key)
+    return [(found, i) for i in range(len(found))] if isinstance(found, list) else []
+
+
+def _objects(scene: Scene, key: str) -> List[Scene]:
+    return [scene[key][i] for _, i in _elements(scene, key) if isinstance(scene[key][i], dict)]
 
 
 def _section(scene: Scene, key: str) -> Scene:

@@ -37,6 +37,19 @@ class Requests(unittest.TestCase):
         self.assertEqual(parts["front.exr"], b"Pf\n1 1\n-1.0\n\0\0\x80?")
         self.assertEqual(parts["floor.png"], b"\r\n--\x89PNG")
 
+    def test_a_light_and_a_frame(self):
+        with FakeService(mask_answer(), mask_answer(), kept(), mask_answer()) as service:
+            client = Client(service.url)
+            client.mask(SCENE, light_name="lamp-1", frame=12)
+            client.mask(SCENE, frame=1)
+            client.keep(SCENE).mask(lights=[{"name": "a"}], light_name="a")
+            for wrong in (0, -1, True, 1.5, "1"):
+                with self.assertRaises(ValueError):
+                    client.mask(SCENE, frame=wrong)
+        self.assertEqual([request.path for request in service.requests],
+                         ["/v1/masks?light=lamp-1&frame=12", "/v1/masks?frame=1", "/v1/scenes", "/v1/scenes/ab12/masks?light=a"])
+        self.assertEqual(json.loads(service.requests[3].body), {"lights": [{"name": "a"}]})
+
     def test_what_comes_back(self):
         headers = [("Server-Timing", 'queue;dur=0.5, decode;desc="x";dur=2, cdn-cache'), ("Penumbra-Warnings", '["a, b", "\\u00e4"]'),
                    ("ETag", '"sha256-1"')]

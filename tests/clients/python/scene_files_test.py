@@ -18,6 +18,17 @@ class SceneFiles(support.FolderTest):
         self.assertEqual(read, scene)
         self.assertEqual(images, {name: b"of " + name.encode() for name in names})
 
+    def test_lights_and_frames_name_files_too(self):
+        names = ["1.exr", "2.exr", "e.exr", "f.exr", "l.exr", "s.exr"]
+        for name in names:
+            self.write(name, "of " + name)
+        scene = {"lights": [{"emission": ["1.exr", "2.exr", "1.exr"]},
+                            {"emission": "e.exr", "occluders": {"depth": {"front": "f.exr", "layers": ["l.exr"]}}}, 3],
+                 "occluders": {"depth": {"front": "s.exr"}}}
+        read, images = load_scene_file(self.write("scene.json", json.dumps(scene)))
+        self.assertEqual(read, scene)
+        self.assertEqual(images, {name: b"of " + name.encode() for name in names})
+
     def test_names_that_clash_are_told_apart(self):
         self.write("scene.json", json.dumps({"light": {"emission": "a/x.exr"}, "receivers": {"depth": "b/x.exr"},
                                              "objects": [{"mesh": "./a/../a/x.exr"}, {"mesh": "scene"}, {"mesh": "c/x-2.exr"}]}))
