@@ -59,6 +59,20 @@ TEST(ClientRequest, WhatIsSentAndWhatComesBack)
     EXPECT_EQ(mask.etag, "\"e\"");
 }
 
+TEST(ClientRequest, ALightAndAFrame)
+{
+    FakeService fake({mask_answer(), mask_answer()});
+    const Client service(fake.url);
+    (void)service.mask(scene, {}, {.light = "lamp-1", .frame = 12});
+    (void)service.mask(scene, {}, {.frame = 1});
+    EXPECT_THROW((void)service.mask(scene, {}, {.light = "a&b"}), std::invalid_argument);
+    EXPECT_THROW((void)service.mask(scene, {}, {.frame = -1}), std::invalid_argument);
+    fake.finish();
+    ASSERT_EQ(fake.requests.size(), 2u);
+    EXPECT_TRUE(fake.requests[0].starts_with("POST /v1/masks?light=lamp-1&frame=12 HTTP/1.1\r\n")) << fake.requests[0].substr(0, 80);
+    EXPECT_TRUE(fake.requests[1].starts_with("POST /v1/masks?frame=1 HTTP/1.1\r\n")) << fake.requests[1].substr(0, 80);
+}
+
 TEST(ClientRequest, PreviousMaskStandsWhenNothingChanged)
 {
     FakeService fake({mask_answer("ETag: \"e\"\r\n"), answer(304), mask_answer("ETag: \"f\"\r\n"), answer(304)});
