@@ -58,6 +58,16 @@ struct WorkCheck {
         check_amount("technique.light_splits", parts * lights() * pixels() * met,
                      "pairs of edge and receiver, at 4096 edges a receiver and part", options.pairs);
     }
+    // Lookups of a receiver, and texels of the slices that are prefiltered.
+    void operator()(const OcclusionTexture& settings) const
+    {
+        const bool layered = settings.combine == Combine::layered || settings.combine == Combine::layered_max;
+        const double textures =
+            lights() * settings.light_splits * settings.light_splits * settings.slices * (layered ? settings.layers : 1);
+        check_amount("technique.slices", textures * pixels(), "pairs of slice and receiver", options.pairs);
+        check_amount("technique.resolution", textures * settings.resolution * settings.resolution, "texels of slices",
+                     options.image_samples);
+    }
     void operator()(const RayTraced& settings) const
     {
         check_amount("technique.samples", lights() * pixels() * settings.samples, "rays", options.rays);

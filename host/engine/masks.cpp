@@ -113,6 +113,7 @@ void add_report(Report& all, const Report& one, const std::string& name, const s
         all.prepare_ms = all.shade_ms = all.total_ms = 0;
         all.peak_device_bytes = all.pairs = 0;
         all.warnings = common;
+        all.notes.clear();
     }
     add_stages(all.stages, one.stages);
     all.prepare_ms += one.prepare_ms;
@@ -121,6 +122,7 @@ void add_report(Report& all, const Report& one, const std::string& name, const s
     all.peak_device_bytes = std::max(all.peak_device_bytes, one.peak_device_bytes);
     all.pairs += one.pairs;
     for (std::size_t i = common.size(); i < one.warnings.size(); ++i) all.warnings.push_back(name + ": " + one.warnings[i]);
+    for (const std::string& note : one.notes) all.notes.push_back(name + ": " + note);
 }
 
 Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(scene.technique)); }

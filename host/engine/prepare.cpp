@@ -6,6 +6,7 @@
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/impl.hpp"
+#include "engine/prepare.hpp"
 #include "engine/state.hpp"
 #include "scene/lights.hpp"
 #include "technique/table.hpp"
@@ -161,8 +162,7 @@ void warn_of_edges(const Topology& topology, Prepared::State& state)
         if (count > 0) state.warnings.push_back(std::to_string(count) + what);
     };
     warn(topology.open_edges(),
-         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast "
-         "(overlap sum: of the two the one that hides more counts)");
+         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast");
     warn(topology.nonmanifold_edges(),
          " edges of the casters have more than two triangles: they count as silhouettes where the facing ones do not cancel");
     warn(topology.left_out(), " triangles without area were left out");
@@ -265,7 +265,8 @@ void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more)
 Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Technique& technique) const
 {
     if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
-    if (std::holds_alternative<SoftShadowVolume>(technique)) return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
+    if (std::holds_alternative<SoftShadowVolume>(technique) || std::holds_alternative<OcclusionTexture>(technique))
+        return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
     return Prepared(prepare_from_maps(impl_->context, light, occluders, {}, technique));
 }
 
@@ -284,6 +285,9 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
 
     if (const auto* settings = std::get_if<SoftShadowVolume>(&technique))
         return Prepared(prepare_wedges(new_state(impl_->context, light, technique), given, geometry, *settings));
+
+    if (const auto* settings = std::get_if<OcclusionTexture>(&technique))
+        return Prepared(prepare_slices(new_state(impl_->context, light, technique), given, geometry, *settings));
 
     validate(light);
     check_light(light, technique);
@@ -327,6 +331,10 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
 Prepared Engine::prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const
 {
     if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
+    if (std::holds_alternative<OcclusionTexture>(technique))
+        throw Error(ErrorCode::unsupported,
+                    "occlusion_texture makes surfaces of depth maps on the host and cannot prepare from device buffers",
+                    "prepare it from objects, or from depth maps in memory");
     if (std::holds_alternative<SoftShadowVolume>(technique))
         throw Error(ErrorCode::unsupported, "soft_shadow_volume finds silhouettes on the host and cannot prepare from device buffers",
                     "prepare it from objects, or from depth maps in memory");

@@ -84,6 +84,7 @@ std::string report_json(const Report& report)
     };
     if (report.pairs > 0) json["pairs"] = report.pairs;
     json["warnings"] = report.warnings;
+    if (!report.notes.empty()) json["notes"] = report.notes;
 
     // Drivers and file names may hold bytes that are no UTF-8; those become U+FFFD rather than an error.
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -22,6 +22,7 @@ Report report_of(const Prepared::State& state, int width, int height)
     report.width = width;
     report.height = height;
     report.warnings = state.warnings;
+    report.notes = state.notes;
     return report;
 }
 
@@ -33,6 +34,8 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
         shade_soft_shadow_map(work, *soft, points, visibility, counts);
     else if (const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data))
         shade_soft_shadow_volume(work, *wedges, points, visibility, counts);
+    else if (const auto* slices = std::get_if<PreparedOcclusionTexture>(&state.data))
+        shade_occlusion_texture(work, *slices, points, visibility, counts);
     else
         shade_shadow_map(work, std::get<PreparedShadowMap>(state.data), points, visibility);
 }
@@ -58,6 +61,7 @@ const opencl::Specialisation& program_of(const Prepared::State& state)
 {
     if (const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data)) return soft->program;
     if (const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data)) return wedges->program;
+    if (const auto* slices = std::get_if<PreparedOcclusionTexture>(&state.data)) return slices->program;
     return std::get<PreparedShadowMap>(state.data).program;
 }
 

@@ -10,6 +10,7 @@
 #include <penumbra/engine.hpp>
 
 #include "opencl/work.hpp"
+#include "technique/occlusion_texture.hpp"
 #include "technique/ray_traced.hpp"
 #include "technique/shadow_map.hpp"
 #include "technique/soft_shadow_map.hpp"
@@ -33,7 +34,7 @@ struct Prepared::State {
     Camera light_view;                             // of the occluder map; unused by rays
     bool covered = false;                          // every caster is known to lie inside the occluder map
     std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, for `project`; may be null
-    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume> data;
+    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume, PreparedOcclusionTexture> data;
 
     std::vector<Stage> stages;
     double prepare_ms = 0;
@@ -41,6 +42,7 @@ struct Prepared::State {
     std::shared_ptr<opencl::MemoryMeter> shared; // of what it has from the state that it was made from; may be null
     std::uint64_t peak_bytes = 0;                // while preparing
     std::vector<std::string> warnings;
+    std::vector<std::string> notes; // for the report
 };
 
 // Throws unsupported when the technique does not take this light.
@@ -49,8 +51,8 @@ void check_light(const Light& light, const Technique& technique);
 // The time of all stages but compiling and rendering depth.
 double work_ms(const std::vector<Stage>& stages);
 
-// Adds the report of one light to that of all together: its work, and its warnings under its name. `common` are warnings of the scene, which
-// stand in front of those of each light.
+// Adds the report of one light to that of all together: its work, and its warnings under its name. `common` are warnings of the scene,
+// which stand in front of those of each light.
 void add_report(Report& all, const Report& one, const std::string& name, const std::vector<std::string>& common);
 
 // Appends stages, joining those of the same name.

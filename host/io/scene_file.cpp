@@ -38,8 +38,12 @@ TechniqueRequest parse_technique(const JsonValue& value)
     const JsonObject section(value);
     TechniqueRequest request;
     request.kind = section.need("kind").text();
-    for (const auto& [name, member] : section.members())
+    for (const auto& [name, member] : section.members()) {
+        // Messages about settings name their keys.
+        if (std::ranges::any_of(name, [](unsigned char c) { return c < 0x20; }))
+            throw member.error("is an unknown key", "keys hold no control characters");
         if (name != "kind") request.settings.emplace_back(name, read_setting(member));
+    }
     return request;
 }
 

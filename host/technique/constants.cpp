@@ -30,6 +30,15 @@ opencl::Specialisation SoftShadowVolumeConstants::specialisation() const
              {"ACCUMULATOR", std::to_string(accumulator)}}};
 }
 
+opencl::Specialisation OcclusionTextureConstants::specialisation() const
+{
+    return {"occlusion_texture.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"TILE_ROWS", std::to_string(rows)},
+             {"PREFILTER", std::to_string(prefilter)},
+             {"STORAGE", std::to_string(storage)}}};
+}
+
 std::vector<opencl::Specialisation> every_specialisation()
 {
     std::vector<opencl::Specialisation> all{ReceiversConstants{}.specialisation(), OccludersConstants{}.specialisation(),
@@ -50,6 +59,11 @@ std::vector<opencl::Specialisation> every_specialisation()
             all.push_back(SoftShadowVolumeConstants{
                 .lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .light = 0, .coverage = 0, .accumulator = accumulator}
                               .specialisation());
+    for (const int lanes : {1, 8, 16})
+        for (const int prefilter : {0, 1, 2, 3})
+            for (const int storage : {0, 1})
+                if (prefilter != 2 || storage == 0)
+                    all.push_back(OcclusionTextureConstants{.lanes = lanes, .prefilter = prefilter, .storage = storage}.specialisation());
     return all;
 }
 

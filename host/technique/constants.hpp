@@ -48,6 +48,14 @@ struct SoftShadowVolumeConstants {
     opencl::Specialisation specialisation() const;
 };
 
+struct OcclusionTextureConstants {
+    int lanes = 16;
+    int rows = tile_rows;
+    int prefilter = 0; // in the order of LevelKind
+    int storage = 0;   // in the order of LevelStorage
+    opencl::Specialisation specialisation() const;
+};
+
 // What the kernels are built with on some device; the build compiles each.
 std::vector<opencl::Specialisation> every_specialisation();
 

@@ -8,6 +8,7 @@ namespace penumbra {
 TechniqueRow shadow_map_row();
 TechniqueRow soft_shadow_map_row();
 TechniqueRow soft_shadow_volume_row();
+TechniqueRow occlusion_texture_row();
 TechniqueRow ray_traced_row();
 
 } // namespace penumbra

@@ -44,7 +44,6 @@ typedef struct {
 typedef struct {
     int edges_begin, edges_end;         // groups of edges
     int triangles_begin, triangles_end; // groups of triangles
-    int side;                           // 0: hides by itself; of a surface that is not closed: 1 its first side, 2 the other, right after the first
 } Sheet;
 
 // A light's texture, or the part of it that a coverage table is for: texels, row 0 at the top, and the part's place among them.
@@ -67,5 +66,47 @@ typedef struct {
     int culling;                       // 0 none, 1 loose, 2 tight
     int first;                         // whether it is the first part: visibility is written, not added to
 } WedgeLight;
+
+// The window of occlusion_texture's slices: a perspective from a centre behind the light (or an orthographic view), cut into texels.
+typedef struct {
+    int width, height;      // texels
+    int slices;             // 1 to 64
+    int orthographic;       // a directional light's
+    float behind;           // how far the centre of projection lies behind the light's plane
+    float centre_x, centre_y; // of the light's part, from the light's centre; scene units
+    float low_x, low_y;     // tangents from there (orthographic: lengths) at the window's lower left corner
+    float per_x, per_y;     // texels a tangent
+} SliceView;
+
+// One texture of occlusion: a slice, or one depth layer of it, as shading needs it.
+typedef struct {
+    int slice;                    // 0 is nearest to the light
+    int layer;                    // -1: all that the slice holds; else the columns' how-manieth filled slice counts
+    int levels;                   // that are built of it
+    float at_x, at_y;             // texels a receiver's tangent, at the slice's far plane (orthographic: a length)
+    float half_x, half_y;         // half the light's size in texels there, of a receiver infinitely far (orthographic: a unit behind the plane)
+    float far;                    // depth of the slice's far plane
+    float fade_from, per_fade;    // the slice counts for (z - fade_from) per_fade, from 0 to 1
+} OcclusionPlane;
+
+// One prefiltered level of every texture.
+typedef struct {
+    int width, height, stride;    // stored texels, with what pads them: at least one of nothing on every side
+    int rows;                     // of one texture
+    float scale, shift;           // from the window's texels to stored ones: x scale + shift, at their centres
+    int offset;                   // where the level begins, in blocks of 1024 elements
+} OcclusionLevel;
+
+// The light that occlusion_texture shades for, or a part of it.
+typedef struct {
+    float centre_x, centre_y;     // of the part, from the light's centre; scene units
+    float zero_x, zero_y;         // where tangent 0 is, in texels
+    float share;                  // of the whole light
+    int first;                    // whether it is the first part: visibility is written, not added to
+    int orthographic;
+    int planes;
+    int taps_x, taps_y;           // lookups along each axis: a rectangle's kernel of square ones
+    int combine;                  // 0 product, 1 sum, 2 max, 3 layered, 4 layered_max
+} OcclusionLight;
 
 #endif

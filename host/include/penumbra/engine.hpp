@@ -42,6 +42,7 @@ struct Report {
     std::uint64_t peak_device_bytes = 0;
     std::uint64_t pairs = 0; // (occluder texel, receiver) pairs evaluated; 0 where that means nothing
     std::vector<std::string> warnings;
+    std::vector<std::string> notes; // what was built, where the technique has something to say about it
 };
 
 // Visibility of each receiver pixel, linear, 0 umbra to 1 fully lit; 1 channel, or 3 when the light is textured.

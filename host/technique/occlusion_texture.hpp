@@ -1,0 +1,44 @@
+// Occlusion textures (Eisemann, Decoret 2008): settings become device state, device state becomes masks.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "scene/camera.hpp"
+#include "technique/receiver_points.hpp"
+#include "technique/slice_fit.hpp"
+#include "technique/soft_shadow_map.hpp"
+
+namespace penumbra {
+
+struct PreparedOcclusionTexture {
+    // What one part of the light needs.
+    struct Part {
+        OcclusionLight light{};
+        opencl::Buffer<OcclusionPlane> planes;
+        opencl::Buffer<OcclusionLevel> levels;
+        opencl::Buffer<cl_uchar> data; // levels, or tables
+    };
+    OcclusionTexture settings;
+    opencl::Specialisation program;
+    Camera view; // that receivers are to come in
+    std::vector<Part> parts;
+    std::vector<std::string> warnings, notes;
+};
+
+// The solid between two maps of the light's own view, planar depth: filled in beside the casters' surfaces.
+struct SolidMaps {
+    const DepthMap &front, &back;
+    Camera camera;
+};
+
+// `meshes`: the surfaces that cast, in world space. Throws invalid_input for settings that do not go together or with the light, too_large
+// with what would fit for more slices or texels than the device's memory holds.
+PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
+                                                   const SolidMaps* solid, const OcclusionTexture& settings);
+
+// Writes visibility, receivers.view.height x receivers.view.width. `counts`, if any, takes the lookups as pairs.
+void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture& prepared, const ReceiverPoints& receivers,
+                             const cl::Buffer& visibility, ShadeCounts* counts);
+
+} // namespace penumbra

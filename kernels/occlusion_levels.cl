@@ -1,0 +1,270 @@
+// Prefiltered occlusion textures (Eisemann, Decoret 2008, 3.2): built from the slices' bits, and looked up.
+//
+//   PREFILTER, STORAGE   as in occlusion_texture.cl
+#ifndef PENUMBRA_OCCLUSION_LEVELS
+#define PENUMBRA_OCCLUSION_LEVELS
+#include "common/shared.h"
+#include "common/lanes.clh"
+
+#ifndef PREFILTER
+#define PREFILTER 0
+#endif
+#ifndef STORAGE
+#define STORAGE 0
+#endif
+
+#define MOST_LAYERS 8
+#define LEVEL_BLOCK 1024
+
+#if PREFILTER == 2
+typedef uint element;
+#elif STORAGE == 1
+typedef ushort element;
+inline element packed(const float value) { return convert_ushort_sat_rte(value * 65535.0f); }
+inline float unpacked(const element e) { return e * (1.0f / 65535.0f); }
+#else
+typedef float element;
+inline element packed(const float value) { return value; }
+inline float unpacked(const element e) { return e; }
+#endif
+
+// Whether a texel's slice is filled. `layer`: -1, or that the slice be the column's filled one of this number, counted from the light; the last layer, `last`, takes
+// all further ones. `leak_fix` (3.4.1): each slice is seen in the next one away from the light too.
+inline bool filled(__global const uint* occupancy, const int2 size, const int x, const int y, const int slice, const int layer, const int last, const int leak_fix)
+{
+    const int at = y * size.x + x;
+    const ulong bits = occupancy[at] | (ulong)occupancy[at + size.x * size.y] << 32;
+    const ulong all = leak_fix ? bits | bits << 1 : bits;
+    if (!(all >> slice & 1)) return false;
+    if (layer < 0) return true;
+    const int before = popcount(all & (((ulong)1 << slice) - 1));
+    return layer == last ? before >= last : before == layer;
+}
+
+// count_filled: how many texels of each texture are filled.
+//
+//   counts [textures]
+//
+// Launched over rows x textures.
+__kernel void count_filled(const int2 size, const int textures, const int last, const int leak_fix, __global const OcclusionPlane* restrict planes,
+                           __global const uint* restrict occupancy, __global int* restrict counts)
+{
+    const int y = get_global_id(0), texture = get_global_id(1);
+    if (y >= size.y || texture >= textures) return;
+    int count = 0;
+    for (int x = 0; x < size.x; ++x) count += filled(occupancy, size, x, y, planes[texture].slice, planes[texture].layer, last, leak_fix);
+    if (count > 0) atomic_add((volatile __global int*)counts + texture, count);
+}
+
+#if PREFILTER == 2
+
+// table_rows, table_columns: summed-area tables (Crow 1984) of integers, so that they are exact. table [textures][height + 1][width + 1]: how many filled texels lie
+// below and to the left.
+//
+// Launched over rows x textures, then over columns x textures.
+__kernel void table_rows(const int2 size, const int textures, const int last, const int leak_fix, __global const OcclusionPlane* restrict planes,
+                         __global const uint* restrict occupancy, __global uint* restrict tables)
+{
+    const int y = get_global_id(0), texture = get_global_id(1);
+    if (y > size.y || texture >= textures) return;
+    __global uint* row = tables + ((long)texture * (size.y + 1) + y) * (size.x + 1);
+    const int slice = planes[texture].slice, layer = planes[texture].layer;
+    uint sum = 0;
+    for (int x = 0; x <= size.x; ++x) {
+        row[x] = sum;
+        if (y > 0 && x < size.x) sum += filled(occupancy, size, x, y - 1, slice, layer, last, leak_fix);
+    }
+}
+
+__kernel void table_columns(const int2 size, const int textures, __global uint* restrict tables)
+{
+    const int x = get_global_id(0), texture = get_global_id(1);
+    if (x > size.x || texture >= textures) return;
+    __global uint* at = tables + (long)texture * (size.y + 1) * (size.x + 1) + x;
+    uint sum = 0;
+    for (int y = 0; y <= size.y; ++y) {
+        sum += at[(long)y * (size.x + 1)];
+        at[(long)y * (size.x + 1)] = sum;
+    }
+}
+
+// The mean of a texture over [x - half_x, x + half_x] x [y - half_y, y + half_y], in texels. Counts are subtracted as integers, whole texels apart from the parts of
+// texels at either end: exact to the rounding of those parts. What is smaller than a sixteenth of a texel counts as that.
+inline floatn mean_of_table(__global const uint* table, const int2 size, const floatn x, const floatn y, const floatn half_x, const floatn half_y)
+{
+    const floatn least = (floatn)(0x1p-5f), zero = (floatn)(0.0f);
+    const floatn hx = select_lanes(least, half_x, half_x > least), hy = select_lanes(least, half_y, half_y > least);
+    const floatn x0 = clamp(x - hx, zero, (floatn)(size.x)), x1 = clamp(x + hx, zero, (floatn)(size.x));
+    const floatn y0 = clamp(y - hy, zero, (floatn)(size.y)), y1 = clamp(y + hy, zero, (floatn)(size.y));
+    const intn ix0 = min(convert_intn(x0), (intn)(size.x - 1)), ix1 = min(convert_intn(x1), (intn)(size.x - 1));
+    const intn iy0 = min(convert_intn(y0), (intn)(size.y - 1)), iy1 = min(convert_intn(y1), (intn)(size.y - 1));
+    int column0[LANES], column1[LANES], row0[LANES], row1[LANES];
+    store_int_lanes(ix0, column0);
+    store_int_lanes(ix1, column1);
+    store_int_lanes(iy0, row0);
+    store_int_lanes(iy1, row1);
+    // Whole texels from ix0 to ix1, the texel at ix1, the texel at ix0; each for the same three ranges of rows.
+    int counts[9][LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+        __global const uint* rows[4] = {table + row0[lane] * (size.x + 1), table + (row0[lane] + 1) * (size.x + 1), table + row1[lane] * (size.x + 1),
+                                        table + (row1[lane] + 1) * (size.x + 1)};
+        uint across[4][3];
+        for (int i = 0; i < 4; ++i) {
+            const uint a = rows[i][column0[lane]], b = rows[i][column0[lane] + 1], c = rows[i][column1[lane]], e = rows[i][column1[lane] + 1];
+            across[i][0] = c - a;
+            across[i][1] = e - c;
+            across[i][2] = b - a;
+        }
+        for (int i = 0; i < 3; ++i) {
+            counts[i][lane] = across[2][i] - across[0][i];
+            counts[3 + i][lane] = across[3][i] - across[2][i];
+            counts[6 + i][lane] = across[1][i] - across[0][i];
+        }
+    }
+    const floatn first_x = x0 - convert_floatn(ix0), last_x = x1 - convert_floatn(ix1), first_y = y0 - convert_floatn(iy0), last_y = y1 - convert_floatn(iy1);
+    floatn sums[3];
+    for (int i = 0; i < 3; ++i)
+        sums[i] = fma(last_x, convert_floatn(load_lanes(counts[3 * i + 1])), convert_floatn(load_lanes(counts[3 * i]))) -
+                  first_x * convert_floatn(load_lanes(counts[3 * i + 2]));
+    return (fma(last_y, sums[1], sums[0]) - first_y * sums[2]) / (4.0f * hx * hy);
+}
+
+#else
+
+inline __global element* level_of(__global element* data, const OcclusionLevel level, const int texture)
+{
+    return data + (long)level.offset * LEVEL_BLOCK + (long)texture * level.rows * level.stride;
+}
+
+// first_level: the textures themselves, with the padding around.
+//
+// Launched over stored columns x (stored rows x textures).
+__kernel void first_level(const int2 size, const int textures, const int last, const int leak_fix, const OcclusionLevel level,
+                          __global const OcclusionPlane* restrict planes, __global const uint* restrict occupancy, __global element* restrict data)
+{
+    const int x = get_global_id(0), y = get_global_id(1) % level.rows, texture = get_global_id(1) / level.rows;
+    if (x >= level.stride || texture >= textures) return;
+    const int inside_x = x - (level.width - size.x) / 2, inside_y = y - (level.height - size.y) / 2;
+    const bool there = inside_x >= 0 && inside_y >= 0 && inside_x < size.x && inside_y < size.y;
+    level_of(data, level, texture)[y * level.stride + x] =
+        packed(there && filled(occupancy, size, inside_x, inside_y, planes[texture].slice, planes[texture].layer, last, leak_fix) ? 1.0f : 0.0f);
+}
+
+// Sixteen stored values of a row from x on; nothing beyond what is stored.
+inline float16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+{
+    if (y < 0 || y >= level.height) return (float16)(0.0f);
+    __global const element* row = texels + y * level.stride;
+#if STORAGE == 1
+    if (x >= 0 && x + 16 <= level.width) return convert_float16(vload16(0, row + x)) * (1.0f / 65535.0f);
+#else
+    if (x >= 0 && x + 16 <= level.width) return vload16(0, row + x);
+#endif
+    float values[16];
+    for (int i = 0; i < 16; ++i) values[i] = x + i >= 0 && x + i < level.width ? unpacked(row[x + i]) : 0.0f;
+    return vload16(0, values);
+}
+
+inline float stored(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+{
+    return x >= 0 && y >= 0 && x < level.width && y < level.height ? unpacked(texels[y * level.stride + x]) : 0.0f;
+}
+
+// Sixteen values of a level from the level below.
+inline float16 next_row(__global const element* from, const OcclusionLevel below, const OcclusionLevel level, const int apart, const int x, const int y)
+{
+    const int dx = (below.width - level.width) / 2, dy = (below.height - level.height) / 2;
+#if PREFILTER == 0
+    const int before = apart > 0 ? apart : 1, left = x + dx - before, right = x + dx + apart, low = y + dy - before, high = y + dy + apart;
+    return 0.25f * ((stored_row(from, below, left, low) + stored_row(from, below, right, low)) +
+                    (stored_row(from, below, left, high) + stored_row(from, below, right, high)));
+#elif PREFILTER == 1
+    (void)apart, (void)dx, (void)dy;
+    float values[16];
+    for (int i = 0; i < 16; ++i) {
+        const int left = 2 * (x + i) - 1, low = 2 * y - 1; // both levels have one column and row of nothing before the first
+        values[i] = 0.25f * ((stored(from, below, left, low) + stored(from, below, left + 1, low)) +
+                             (stored(from, below, left, low + 1) + stored(from, below, left + 1, low + 1)));
+    }
+    return vload16(0, values);
+#else
+    const float weights[5] = {0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f};
+    float16 sum = (float16)(0.0f);
+    for (int j = 0; j < 5; ++j) {
+        float16 row = (float16)(0.0f);
+        for (int i = 0; i < 5; ++i) row += weights[i] * stored_row(from, below, x + dx + (i - 2) * apart, y + dy + (j - 2) * apart);
+        sum += weights[j] * row;
+    }
+    return sum;
+#endif
+}
+
+// next_level: from the level below. N-buffers (Decoret 2005): the mean of 2^l x 2^l texels around every texel, from four means of half that size. Mip-maps: of every
+// 2 x 2 texels. Smooth levels: 5 x 5 taps of (1, 4, 6, 4, 1) / 16 each way, 2^(l - 1) texels apart, which adds 4^(l - 1) to the variance.
+//
+//   apart   texels between the taps; N-buffers: from the middle to a tap, 2^(l - 2), and 0 for the first level, whose taps are the texel and the one before
+//
+// Launched over (stored columns / 16) x (stored rows x textures).
+__kernel void next_level(const OcclusionLevel below, const OcclusionLevel level, const int textures, const int apart, __global element* restrict data)
+{
+    const int x = get_global_id(0) * 16, y = get_global_id(1) % level.rows, texture = get_global_id(1) / level.rows;
+    if (x >= level.stride || texture >= textures) return;
+    const float16 values = next_row(level_of(data, below, texture), below, level, apart, x, y);
+    __global element* to = level_of(data, level, texture) + y * level.stride + x;
+#if STORAGE == 1
+    vstore16(convert_ushort16_sat_rte(values * 65535.0f), 0, to);
+#else
+    vstore16(values, 0, to);
+#endif
+}
+
+// Of a kernel larger than the highest level's, which holds the whole window: the part of that level that lies inside the kernel, by moving it so that their nearer
+// borders meet; then it is thinned by their sizes.
+inline floatn moved(const floatn at, const int size, const floatn over)
+{
+    const floatn middle = (floatn)(0.5f * size), away = at - middle, zero = (floatn)(0.0f), rest = fabs(away) - over;
+    return middle + copysign(select_lanes(zero, rest, rest > zero), away);
+}
+
+// A texture around a place, in texels, for a kernel of `size` texels: bilinear within a level, linear between two (3.2).
+inline floatn mean_of_levels(__global const OcclusionLevel* levels, const int count, const int2 window, __global const element* data, const int texture,
+                             const floatn at_x, const floatn at_y, const floatn size)
+{
+    const floatn one = (floatn)(1.0f), zero = (floatn)(0.0f), most = (floatn)(count - 1);
+    const floatn highest = (floatn)((float)(1 << (count - 1))), excess = select_lanes(zero, 0.5f * (size - highest), size > highest);
+    const floatn x = moved(at_x, window.x, excess), y = moved(at_y, window.y, excess);
+    const floatn thinner = select_lanes(one, highest / size, size > highest);
+#if PREFILTER == 3
+    // A square of `size` stands for a disc of that diameter, whose variance is size^2 / 16 along each axis; level l has (4^l - 1) / 3.
+    const floatn place = 0.5f * log2(fma(size * size, (floatn)(3.0f / 16.0f), one));
+#else
+    const floatn place = log2(select_lanes(one, size, size > one));
+#endif
+    const floatn level = select_lanes(most, place, place < most);
+    const intn lower = convert_intn(level);
+    const floatn part = level - convert_floatn(lower);
+    int numbers[LANES];
+    float place_x[LANES], place_y[LANES], parts[LANES], found[LANES];
+    store_int_lanes(lower, numbers);
+    store_lanes(x, place_x);
+    store_lanes(y, place_y);
+    store_lanes(part, parts);
+    for (int lane = 0; lane < LANES; ++lane) {
+        float means[2];
+        for (int i = 0; i < 2; ++i) {
+            const OcclusionLevel l = levels[min(numbers[lane] + i, count - 1)];
+            __global const element* texels = data + (long)l.offset * LEVEL_BLOCK + (long)texture * l.rows * l.stride;
+            const float px = clamp(fma(place_x[lane], l.scale, l.shift), 0.0f, l.width - 1.0f), py = clamp(fma(place_y[lane], l.scale, l.shift), 0.0f, l.height - 1.0f);
+            const int ix = min((int)px, l.width - 2), iy = min((int)py, l.height - 2);
+            __global const element* low = texels + iy * l.stride + ix;
+            __global const element* high = low + l.stride;
+            const float fx = px - ix, fy = py - iy;
+            means[i] = mix(mix(unpacked(low[0]), unpacked(low[1]), fx), mix(unpacked(high[0]), unpacked(high[1]), fx), fy);
+        }
+        found[lane] = mix(means[0], means[1], parts[lane]);
+    }
+    return load_lanes(found) * (thinner * thinner);
+}
+
+#endif
+#endif
