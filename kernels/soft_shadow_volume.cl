@@ -189,6 +189,17 @@ inline float2 span_of(const Receivers p)
     return span;
 }
 
+// What a sheet adds to the occlusion of those before it, overlap sum. Of a surface that is not closed both sides hide, yet what they hide is mostly the same
+// light: the side that hides more counts, and the first one's occlusion waits for the other's in `first` (0 where the tile does not see it: no edge's share
+// and no triangle counts there).
+inline floatn added(const floatn sheet, const int side, floatn* first)
+{
+    if (side == 0) return sheet;
+    const floatn zero = (floatn)(0.0f), more = side == 1 ? sheet : sheet - *first, rise = select_lanes(zero, more, more > zero);
+    if (side == 1) *first = rise;
+    return rise;
+}
+
 // Joins a sheet's occlusion to that of the sheets before (Paper IV, 5.1: Eq. 1 is half_min).
 inline floatn joined(const floatn before, const floatn sheet, const int overlap)
 {
@@ -246,6 +257,8 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
     floatn occlusion[CHANNELS][ITEM_ROWS];
     for (int channel = 0; channel < CHANNELS; ++channel)
         for (int row = 0; row < ITEM_ROWS; ++row) occlusion[channel][row] = (floatn)(0.0f);
+    floatn first[CHANNELS][ITEM_ROWS]; // of the pair whose first sheet is number `first_side`
+    int first_side = -1;
     uint2 count = (uint2)(0);
     float2 spans[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS && !empty; ++row) spans[row] = span_of(receivers_at(light, view.stride, xi, eta, d, x, y + row));
@@ -253,7 +266,8 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
     for (int block = 0; block < light.sheets && !empty; block += 16) {
         uint sheet_bits = chosen(tile, sheet_boxes + block * 5, light.culling, 1.0f, 0, light.sheets - block);
         while (sheet_bits) {
-            const Sheet sheet = sheets[block + take_bit(&sheet_bits)];
+            const int sheet_number = block + take_bit(&sheet_bits);
+            const Sheet sheet = sheets[sheet_number];
             Sum sums[CHANNELS][ITEM_ROWS];
             for (int channel = 0; channel < CHANNELS; ++channel)
                 for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[channel][row]);
@@ -301,10 +315,15 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                 }
             }
 
+            // The other side of a surface whose first the tile does not see.
+            const bool alone = sheet.side == 2 && first_side != sheet_number - 1;
+            if (sheet.side == 1) first_side = sheet_number;
             for (int channel = 0; channel < CHANNELS; ++channel)
                 for (int row = 0; row < ITEM_ROWS; ++row) {
                     const floatn sheet_occlusion = occlusion_of(&sums[channel][row]), before = occlusion[channel][row];
-                    occlusion[channel][row] = light.overlap == 0 ? before + sheet_occlusion : joined(before, sheet_occlusion, light.overlap);
+                    if (alone) first[channel][row] = (floatn)(0.0f);
+                    occlusion[channel][row] = light.overlap == 0 ? before + added(sheet_occlusion, sheet.side, &first[channel][row])
+                                                                 : joined(before, sheet_occlusion, light.overlap);
                 }
         }
     }

@@ -162,7 +162,8 @@ void warn_of_edges(const Topology& topology, Prepared::State& state)
         if (count > 0) state.warnings.push_back(std::to_string(count) + what);
     };
     warn(topology.open_edges(),
-         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast");
+         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast "
+         "(overlap sum: of the two the one that hides more counts)");
     warn(topology.nonmanifold_edges(),
          " edges of the casters have more than two triangles: they count as silhouettes where the facing ones do not cancel");
     warn(topology.left_out(), " triangles without area were left out");

@@ -80,7 +80,7 @@ Surface surface_of(const Topology& topology, const Vec3& point)
 }
 
 // Lists the facing triangles sheet after sheet; returns the sheet of every triangle.
-std::vector<std::uint32_t> list_sheets(const Surface& surface, Silhouette& silhouette)
+std::vector<std::uint32_t> list_sheets(const Topology& topology, const Surface& surface, Silhouette& silhouette)
 {
     constexpr std::uint32_t none = 0xffffffff;
     std::vector<std::uint32_t> sheet_of(surface.triangles.size(), none);
@@ -91,13 +91,18 @@ std::vector<std::uint32_t> list_sheets(const Surface& surface, Silhouette& silho
         silhouette.facing_begin.push_back(static_cast<std::uint32_t>(reached.size()));
         sheet_of[first] = sheet;
         reached.push_back(first);
-        for (std::size_t i = reached.size() - 1; i < reached.size(); ++i)
+        std::size_t turned = 0;
+        for (std::size_t i = reached.size() - 1; i < reached.size(); ++i) {
+            turned += surface.turned(reached[i]);
             for (std::uint32_t corner = 0; corner < 3; ++corner) {
                 const std::uint32_t other = surface.across[3 * reached[i] + corner];
                 if (other == no_side || sheet_of[other / 3] != none) continue;
                 sheet_of[other / 3] = sheet;
                 reached.push_back(other / 3);
             }
+        }
+        const std::size_t count = reached.size() - silhouette.facing_begin.back();
+        silhouette.sides.push_back({.component = topology.component(first), .turned = 2 * turned > count});
     }
     silhouette.facing_begin.push_back(static_cast<std::uint32_t>(reached.size()));
 
@@ -139,7 +144,7 @@ Silhouette silhouette_of(const Topology& topology, const Vec3& point)
                     "expected finite numbers");
     Silhouette silhouette;
     Surface surface = surface_of(topology, point);
-    const std::vector<std::uint32_t> sheet_of = list_sheets(surface, silhouette);
+    const std::vector<std::uint32_t> sheet_of = list_sheets(topology, surface, silhouette);
     link_loops(surface, sheet_of, silhouette);
     return silhouette;
 }

@@ -33,6 +33,9 @@ public:
     // component by itself, whatever else touches it along an edge.
     bool closed(std::uint32_t triangle) const { return closed_[triangle] != 0; }
 
+    // The number of the triangle's component, below `triangles().size()`; of an open one, of all the patches that it is made of.
+    std::uint32_t component(std::uint32_t triangle) const { return component_[triangle]; }
+
     std::uint64_t open_edges() const { return open_edges_; }               // of one triangle
     std::uint64_t nonmanifold_edges() const { return nonmanifold_edges_; } // of more than two
     std::uint64_t left_out() const { return left_out_; }                   // triangles
@@ -53,6 +56,7 @@ private:
     std::vector<Imath::V3f> vertices_;
     std::vector<std::array<std::uint32_t, 3>> triangles_;
     std::vector<std::uint8_t> closed_;
+    std::vector<std::uint32_t> component_;
     std::vector<EdgeUse> edge_uses_;
     std::uint64_t open_edges_ = 0, nonmanifold_edges_ = 0, left_out_ = 0;
 };
@@ -62,12 +66,23 @@ struct SilhouetteEdge {
     std::uint32_t sheet;    // whose border it is
 };
 
+// Which side of which surface a sheet is.
+struct SheetSide {
+    std::uint32_t component; // Topology::component of its triangles
+    bool turned;             // most of its triangles are wound clockwise, seen from the point; never of a closed component
+};
+
 // A sheet: facing triangles joined by edges that two of them pass in opposite directions. Where more than two meet at an edge they are
 // paired off, one each way, in the order of the triangles; those left over end there.
+//
+// Of a component that is wound alike a sheet shows one side alone: across an edge from the one side to the other both triangles pass it the
+// same way, and two sheets end there. Of one that is not (a Moebius strip; three patches at an edge) a sheet can hold triangles of both: it
+// stays whole, and counts as the side that most of its triangles show.
 struct Silhouette {
     // Triangles that face the point, wound counter-clockwise seen from it; those of one sheet beside each other.
     std::vector<std::array<std::uint32_t, 3>> facing;
     std::vector<std::uint32_t> facing_begin; // sheet s has facing [facing_begin[s], facing_begin[s + 1])
+    std::vector<SheetSide> sides;            // of each sheet
 
     // Loop after loop, each edge from where the one before ends; an edge at which n triangles end stands there n times. At a vertex of more
     // than two edges a loop goes on around the fan of its own facing triangles, so each loop borders one sheet.

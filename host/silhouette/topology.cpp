@@ -227,6 +227,7 @@ Topology::Topology(std::span<const TriangleMesh* const> meshes)
     std::vector<std::uint8_t> open = open_labels(edge_uses_, patches.of, patches.count);
     join_open_patches(edge_uses_, open, patches.of);
     open = open_labels(edge_uses_, patches.of, patches.count);
+    component_ = patches.of;
     closed_.resize(triangles_.size());
     for (std::size_t t = 0; t < triangles_.size(); ++t) closed_[t] = open[patches.of[t]] == 0;
 
@@ -259,7 +260,7 @@ void Topology::turn(const std::vector<std::uint8_t>& turned)
 std::uint64_t Topology::bytes() const
 {
     return vertices_.capacity() * sizeof(vertices_[0]) + triangles_.capacity() * sizeof(triangles_[0]) + closed_.capacity() +
-           edge_uses_.capacity() * sizeof(edge_uses_[0]);
+           component_.capacity() * sizeof(component_[0]) + edge_uses_.capacity() * sizeof(edge_uses_[0]);
 }
 
 } // namespace penumbra

@@ -5,6 +5,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/parallel.hpp"
 #include "technique/constants.hpp"
 #include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
@@ -92,6 +93,27 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
             .triangle_boxes = floats(data.triangle_boxes, "boxes of triangles"),
             .triangle_extents = floats(data.triangle_extents, "extents of triangles"),
             .triangles = floats(data.triangles, "triangles")};
+}
+
+// What the host finds out for a part.
+struct PartWedges {
+    LinearWedges linear;
+    WedgeData data;
+    std::size_t sheets = 0;
+};
+
+PartWedges wedges_of(const Topology& topology, const LightFrame& frame, const LightPart& part, const SoftShadowVolume& settings)
+{
+    const bool extent = frame.half_u > 0 || frame.half_v > 0;
+    PartWedges wedges;
+    Silhouette silhouette = silhouette_of(topology, part.centre);
+    if (extent && settings.coverage == Coverage::linear) {
+        wedges.linear = linear_wedges(topology, std::move(silhouette), frame, part, settings.smooth, settings.corner_wedges);
+        silhouette = wedges.linear.silhouette;
+    }
+    wedges.sheets = silhouette.sheets();
+    wedges.data = wedge_data(topology, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
+    return wedges;
 }
 
 // What the linear wedges of all parts leave to be said.
@@ -215,19 +237,22 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
                                       .warnings = {}};
     const bool linear = extent && settings.coverage == Coverage::linear;
     std::uint64_t left_out = 0, unshared = 0;
-    for (const LightPart& part : parts_of(frame, splits)) {
-        Silhouette silhouette = silhouette_of(casters.topology, part.centre);
-        LinearWedges wedges;
-        if (linear) {
-            wedges = linear_wedges(casters.topology, std::move(silhouette), frame, part, settings.smooth, settings.corner_wedges);
-            silhouette = wedges.silhouette;
-        }
-        const WedgeData data = wedge_data(casters.topology, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
-        prepared.edges += data.edge_count;
-        prepared.triangles += data.triangle_count;
-        prepared.sheets += silhouette.sheets();
-        prepared.parts.push_back(upload(work, data, wedge_light(frame, part, casters, settings, static_cast<int>(data.sheets.size()))));
-        if (linear) {
+    const std::vector<LightPart> parts = parts_of(frame, splits);
+    // As many parts at a time as there are threads: the host never holds the wedges of all.
+    std::vector<PartWedges> batch(std::min<std::size_t>(thread_count(), parts.size()));
+    for (std::size_t first = 0; first < parts.size(); first += batch.size()) {
+        const std::size_t count = std::min(batch.size(), parts.size() - first);
+        parallel_for(static_cast<int>(count), [&](int i) {
+            batch[static_cast<std::size_t>(i)] = wedges_of(casters.topology, frame, parts[first + static_cast<std::size_t>(i)], settings);
+        });
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto& [wedges, data, sheets] = batch[i];
+            prepared.edges += data.edge_count;
+            prepared.triangles += data.triangle_count;
+            prepared.sheets += sheets;
+            prepared.parts.push_back(
+                upload(work, data, wedge_light(frame, parts[first + i], casters, settings, static_cast<int>(data.sheets.size()))));
+            if (!linear) continue;
             prepared.parts.back().coverage = work.upload(std::span<const float>(planes_in_order(wedges, data)), "planes of wedges");
             prepared.parts.back().light.reach_x *= static_cast<float>(wedges.reach_x);
             prepared.parts.back().light.reach_y *= static_cast<float>(wedges.reach_y);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
 
 namespace penumbra {
 namespace {
@@ -82,21 +83,24 @@ public:
         }
     }
 
-    void begin_sheet()
+    void begin_sheet(int side)
     {
         sheet_ = {.edges_begin = static_cast<int>(edge_groups_.size()),
                   .edges_end = 0,
                   .triangles_begin = static_cast<int>(triangle_groups_.size()),
-                  .triangles_end = 0};
+                  .triangles_end = 0,
+                  .side = side};
         sheet_box_ = {};
     }
-    void end_sheet()
+    // Whether there is anything in it.
+    bool end_sheet()
     {
         sheet_.edges_end = static_cast<int>(edge_groups_.size());
         sheet_.triangles_end = static_cast<int>(triangle_groups_.size());
-        if (sheet_.edges_begin == sheet_.edges_end && sheet_.triangles_begin == sheet_.triangles_end) return;
+        if (sheet_.edges_begin == sheet_.edges_end && sheet_.triangles_begin == sheet_.triangles_end) return false;
         data_.sheets.push_back(sheet_);
         sheet_boxes_.push_back(sheet_box_);
+        return true;
     }
 
     void add_edges(std::span<const SilhouetteEdge> all, std::span<const std::uint32_t> numbers)
@@ -254,6 +258,41 @@ private:
     Box sheet_box_;
 };
 
+// Which of the silhouette's sheets make one for the kernel.
+struct Together {
+    std::vector<std::uint32_t> sheets;
+    int side; // Sheet::side
+};
+
+std::vector<Together> each_apart(const Silhouette& silhouette)
+{
+    std::vector<Together> groups;
+    for (std::uint32_t s = 0; s < silhouette.sheets(); ++s) groups.push_back({.sheets = {s}, .side = 0});
+    return groups;
+}
+
+// First all that hide by themselves, then the two sides of each component that shows both.
+std::vector<Together> sides_apart(const Silhouette& silhouette)
+{
+    std::unordered_map<std::uint32_t, std::array<bool, 2>> shown;
+    for (const SheetSide& side : silhouette.sides) shown[side.component][side.turned] = true;
+
+    std::vector<Together> groups{{.sheets = {}, .side = 0}};
+    std::unordered_map<std::uint32_t, std::size_t> first_group;
+    for (std::uint32_t s = 0; s < silhouette.sheets(); ++s) {
+        const SheetSide& side = silhouette.sides[s];
+        const std::array<bool, 2>& both = shown[side.component];
+        if (!both[0] || !both[1]) {
+            groups[0].sheets.push_back(s);
+            continue;
+        }
+        const auto [at, fresh] = first_group.try_emplace(side.component, groups.size());
+        if (fresh) groups.insert(groups.end(), {{.sheets = {}, .side = 1}, {.sheets = {}, .side = 2}});
+        groups[at->second + (side.turned ? 1 : 0)].sheets.push_back(s);
+    }
+    return groups;
+}
+
 } // namespace
 
 Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& point)
@@ -293,20 +332,28 @@ std::vector<LightPart> parts_of(const LightFrame& light, int splits)
 WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, const LightFrame& light, const LightPart& part, bool apart,
                      bool edges_too)
 {
-    // Edges of each sheet, loop after loop.
-    std::vector<std::vector<std::uint32_t>> edges(apart ? silhouette.sheets() : 1);
+    const std::vector<Together> groups = apart ? each_apart(silhouette) : sides_apart(silhouette);
+    std::vector<std::size_t> group_of(silhouette.sheets());
+    for (std::size_t g = 0; g < groups.size(); ++g)
+        for (const std::uint32_t sheet : groups[g].sheets) group_of[sheet] = g;
+    // Edges of each group, loop after loop.
+    std::vector<std::vector<std::uint32_t>> edges(groups.size());
     if (edges_too)
-        for (std::uint32_t i = 0; i < silhouette.edges.size(); ++i) edges[apart ? silhouette.edges[i].sheet : 0].push_back(i);
+        for (std::uint32_t i = 0; i < silhouette.edges.size(); ++i) edges[group_of[silhouette.edges[i].sheet]].push_back(i);
 
     Builder builder(topology, light, part);
-    const std::span facing(silhouette.facing);
-    for (std::size_t sheet = 0; sheet < edges.size(); ++sheet) {
-        builder.begin_sheet();
-        const std::size_t first = apart ? silhouette.facing_begin[sheet] : 0,
-                          last = apart ? silhouette.facing_begin[sheet + 1] : facing.size();
-        builder.add_triangles(facing.subspan(first, last - first));
-        builder.add_edges(silhouette.edges, edges[sheet]);
-        builder.end_sheet();
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    bool before = false;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+        triangles.clear();
+        for (const std::uint32_t sheet : groups[g].sheets)
+            triangles.insert(triangles.end(), silhouette.facing.begin() + silhouette.facing_begin[sheet],
+                             silhouette.facing.begin() + silhouette.facing_begin[sheet + 1]);
+        // Where all of the first side lies behind the light's plane, the other is the first.
+        builder.begin_sheet(groups[g].side == 2 && !before ? 1 : groups[g].side);
+        builder.add_triangles(triangles);
+        builder.add_edges(silhouette.edges, edges[g]);
+        before = builder.end_sheet();
     }
     return builder.take();
 }

@@ -38,8 +38,9 @@ struct WedgeData {
     std::uint64_t edge_count = 0, triangle_count = 0;           // before padding
 };
 
-// `apart`: each sheet for itself; else all as one. Without `edges_too` there are triangles alone (a light of no extent).
-// What lies behind the light's plane is left out, but for a disc, whose plane turns with the receiver.
+// `apart`: each sheet for itself. Else all as one, but for the components that show both their sides: the two sides of each are a pair of
+// sheets (Sheet::side), of which the kernel takes the one that hides more. Without `edges_too` there are triangles alone (a light of no
+// extent). What lies behind the light's plane is left out, but for a disc, whose plane turns with the receiver.
 WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, const LightFrame& light, const LightPart& part, bool apart,
                      bool edges_too);
 

@@ -44,6 +44,7 @@ typedef struct {
 typedef struct {
     int edges_begin, edges_end;         // groups of edges
     int triangles_begin, triangles_end; // groups of triangles
+    int side;                           // 0: hides by itself; of a surface that is not closed: 1 its first side, 2 the other, right after the first
 } Sheet;
 
 // A light's texture, or the part of it that a coverage table is for: texels, row 0 at the top, and the part's place among them.

@@ -16,7 +16,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <penumbra/scene.hpp>
@@ -157,23 +160,38 @@ struct Bounded {
     double value = 0, bound = 0;
 };
 
-// Sheets one after the other, joined as overlap says (Paper IV, 5.1).
-inline Bounded occlusion(Shape shape, const Receiver& p, const std::vector<std::vector<Triangle>>& sheets, Joined how)
+// Facing triangles that hang together; the surface they belong to, and which of its sides they are.
+struct Sheet {
+    std::vector<Triangle> triangles;
+    std::uint32_t surface = 0;
+    bool turned = false;
+};
+
+// Sheets one after the other, joined as overlap says (Paper IV, 5.1). The sum: of a surface that shows both its sides the one that hides
+// more.
+inline Bounded occlusion(Shape shape, const Receiver& p, const std::vector<Sheet>& sheets, Joined how)
 {
     Bounded all;
-    for (const std::vector<Triangle>& sheet : sheets) {
+    std::map<std::uint32_t, std::array<std::optional<double>, 2>> surfaces;
+    for (const Sheet& sheet : sheets) {
         double one = 0;
-        for (const Triangle& triangle : sheet) {
+        for (const Triangle& triangle : sheet.triangles) {
             one += share_of(shape, p, triangle);
             all.bound += bound_of(shape, p, triangle);
         }
-        if (how != Joined::sum) one = std::clamp(one, 0.0, 1.0);
+        if (how == Joined::sum) {
+            std::optional<double>& side = surfaces[sheet.surface][sheet.turned];
+            side = side.value_or(0) + one;
+            continue;
+        }
+        one = std::clamp(one, 0.0, 1.0);
         const double more = std::max(one, all.value), less = std::min(one, all.value);
-        if (how == Joined::sum) all.value += one;
         if (how == Joined::max) all.value = more;
         if (how == Joined::half_min) all.value = std::min(1.0, more + less / 2);
         if (how == Joined::product) all.value = 1 - (1 - all.value) * (1 - one);
     }
+    for (const auto& [surface, sides] : surfaces)
+        all.value += sides[0] && sides[1] ? std::max({0.0, *sides[0], *sides[1]}) : sides[0].value_or(0) + sides[1].value_or(0);
     all.value = std::clamp(all.value, 0.0, 1.0);
     return all;
 }

@@ -1,5 +1,7 @@
 // Silhouettes of closed, open and broken meshes: loops, degrees, sheets, and how they tie to what rays cross.
+#include <algorithm>
 #include <limits>
+#include <map>
 
 #include <penumbra/error.hpp>
 
@@ -202,6 +204,63 @@ TEST(Silhouette, OpenSurfacesCastFromBothSides)
     EXPECT_EQ(side.facing.size(), topology.triangles().size());
     EXPECT_EQ(side.sheets(), 2u);
     EXPECT_GT(side.edges.size(), 4 * n);
+}
+
+// Of surfaces that can be wound alike a sheet is one side: all its triangles as wound, or all turned; of closed ones never turned.
+TEST(Silhouette, SheetsAreSides)
+{
+    std::mt19937 random(11);
+    for (int round = 0; round < 20; ++round) {
+        const TriangleMesh whole = sphere(random, 9, 0.4), torn = [&] {
+            TriangleMesh mesh = mapped(whole, [](const Vec3& p) { return p + Vec3(3, 0, 0); });
+            mesh.triangles.erase(mesh.triangles.begin() + static_cast<std::ptrdiff_t>(random() % mesh.triangles.size()));
+            return mesh;
+        }();
+        const TriangleMesh* const list[] = {&whole, &torn};
+        const Topology topology(list);
+        const Vec3 point = Vec3(1.5, 0, 0) + random_direction(random) * 6;
+        const Silhouette silhouette = checked(topology, point);
+        ASSERT_EQ(silhouette.sides.size(), silhouette.sheets());
+        // Triangles as wound, from their first vertex on.
+        std::map<Triangle, std::uint32_t> component_of;
+        for (std::uint32_t t = 0; t < topology.triangles().size(); ++t) {
+            Triangle v = topology.triangles()[t];
+            std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
+            component_of[v] = topology.component(t);
+        }
+        EXPECT_NE(topology.component(0), topology.component(static_cast<std::uint32_t>(whole.triangles.size())));
+        int turned_sheets = 0;
+        for (std::size_t s = 0; s < silhouette.sheets(); ++s) {
+            turned_sheets += silhouette.sides[s].turned;
+            for (std::uint32_t i = silhouette.facing_begin[s]; i < silhouette.facing_begin[s + 1]; ++i) {
+                Triangle v = silhouette.facing[i];
+                if (silhouette.sides[s].turned) std::swap(v[1], v[2]);
+                std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
+                const auto found = component_of.find(v);
+                ASSERT_NE(found, component_of.end()) << "sheet " << s;
+                EXPECT_EQ(found->second, silhouette.sides[s].component);
+            }
+            if (silhouette.sides[s].turned) {
+                EXPECT_EQ(silhouette.sides[s].component, topology.component(static_cast<std::uint32_t>(whole.triangles.size())));
+            }
+        }
+        EXPECT_GT(turned_sheets, 0);
+    }
+}
+
+// Three half-planes at an edge: two that face each other across it are one sheet, whatever their winding, so that no seam of the winding is
+// a silhouette. It counts as the side that most of its triangles show.
+TEST(Silhouette, ASheetAcrossASeamOfTheWindingStaysWhole)
+{
+    for (const bool turn : {false, true}) {
+        TriangleMesh fan;
+        for (const Vec3& p : {Vec3(0, -1, 0), Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(-0.1, 0, 1)}) add(fan, p);
+        fan.triangles = {{1, 0, 2}, turn ? Triangle{1, 0, 3} : Triangle{0, 1, 3}, {0, 1, 4}};
+        const Topology topology = topology_of(fan);
+        const Silhouette silhouette = checked(topology, {0.1, 0.05, 9});
+        EXPECT_EQ(silhouette.sheets(), 2u);
+        for (const SheetSide& side : silhouette.sides) EXPECT_EQ(side.component, topology.component(0));
+    }
 }
 
 TEST(Silhouette, AFoldStandsThereOnceForEachTriangle)

@@ -73,10 +73,11 @@ TEST(SharedStructs, OccluderView)
 
 TEST(SharedStructs, Sheet)
 {
-    const std::vector<cl_int> host = {sizeof(Sheet), HERE(Sheet, edges_begin), HERE(Sheet, edges_end), HERE(Sheet, triangles_begin),
-                                      HERE(Sheet, triangles_end)};
-    EXPECT_EQ(on_device(writes("Sheet", {"edges_begin", "edges_end", "triangles_begin", "triangles_end"}), host.size()), host);
-    EXPECT_EQ(sizeof(Sheet), 4 * 4u);
+    const std::vector<cl_int> host = {
+        sizeof(Sheet),    HERE(Sheet, edges_begin), HERE(Sheet, edges_end), HERE(Sheet, triangles_begin), HERE(Sheet, triangles_end),
+        HERE(Sheet, side)};
+    EXPECT_EQ(on_device(writes("Sheet", {"edges_begin", "edges_end", "triangles_begin", "triangles_end", "side"}), host.size()), host);
+    EXPECT_EQ(sizeof(Sheet), 5 * 4u);
 }
 
 TEST(SharedStructs, WedgeLight)

@@ -127,6 +127,32 @@ TEST(SoftShadowVolumeOracle, ClosedBoxesAndSplitLights)
         }
 }
 
+// Surfaces that show both their sides, some all of the one and hardly any of the other; several that hide the same light; and three half
+// planes at an edge, of which the silhouette joins two whatever their winding.
+TEST(SoftShadowVolumeOracle, BothSidesOfASurface)
+{
+    for (const auto& [name, light] : lights)
+        for (const int splits : {1, 3}) {
+            if (splits > 1 && std::holds_alternative<SphereLight>(light)) continue;
+            const auto compare_casters = [&](const std::vector<TriangleMesh>& casters, const std::string& what) {
+                WedgeCase c{.light = light, .casters = casters, .settings = {.light_splits = splits}, .receivers = flat(40, 24, 9)};
+                compare_with_oracle(c, name + ", " + what + ", " + std::to_string(splits) + " splits");
+            };
+            compare_casters({shell({0, 0, 5}, 2, {1, 0.3, 0.1}, 4, 8)}, "a bowl from beside");
+            compare_casters({shell({0.2, 0, 5}, 2, {0.1, 0.3, -1}, 7, 8)}, "a ball with a hole");
+            compare_casters({shell({-1, 0, 3}, 1, {1, 0, 0}, 4, 8), shell({1, 0, 5}, 1.5, {0, 1, 0}, 5, 8), sheet(-1, 1, -1, 1, 6)},
+                            "several");
+            compare_casters({shell({2, 0, 0.3}, 1, {1, 1, 0}, 4, 8)}, "across the light's plane");
+            for (int turned = 0; turned < 8; ++turned) {
+                TriangleMesh fan =
+                    mesh_of({{0, -2, 4}, {0, 2, 5}, {2, 0, 4.5}, {-2, 0, 4.5}, {1, 1, 6}}, {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}});
+                for (std::size_t t = 0; t < 3; ++t)
+                    if ((turned >> t & 1) != 0) std::swap(fan.triangles[t][0], fan.triangles[t][1]);
+                compare_casters({fan}, "a fan wound as " + std::to_string(turned));
+            }
+        }
+}
+
 TEST(SoftShadowVolumeOracle, EveryOverlap)
 {
     for (const Overlap overlap : {Overlap::sum, Overlap::max, Overlap::half_min, Overlap::product})

@@ -31,6 +31,26 @@ inline std::vector<TriangleMesh> soup(int count, const Vec3& low, const Vec3& hi
     return meshes;
 }
 
+// A part of a ball, from one pole on, that shows both its sides where it is seen from beside: `rings` of `whole` rings of quads around
+// `axis`.
+inline TriangleMesh shell(const Vec3& center, double radius, const Vec3& axis, int rings, int whole)
+{
+    constexpr int around = 16;
+    const Vec3 z = axis.normalized(), x = z.cross(std::abs(z.x) < 0.5 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)).normalized(), y = z.cross(x);
+    std::vector<Vec3> points;
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    for (int i = 0; i <= rings; ++i)
+        for (int j = 0; j < around; ++j) {
+            const double u = std::numbers::pi * i / whole, v = 2 * std::numbers::pi * j / around, r = i == 0 ? 0 : std::sin(u);
+            points.push_back(center + (x * (r * std::cos(v)) + y * (r * std::sin(v)) + z * std::cos(u)) * radius);
+            if (i == rings) continue;
+            const auto at = [&](int ring, int place) { return static_cast<std::uint32_t>(ring * around + place % around); };
+            triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j + 1)});
+            triangles.push_back({at(i, j), at(i + 1, j + 1), at(i + 1, j)});
+        }
+    return mesh_of(points, triangles);
+}
+
 struct WedgeCase {
     Light light = rectangle_light(1, 1);
     std::vector<TriangleMesh> casters = {};
@@ -81,16 +101,19 @@ public:
         const Topology topology = topology_of(c.casters);
         for (const LightPart& part : parts_of(frame, c.settings.light_splits)) {
             const Silhouette silhouette = silhouette_of(topology, part.centre);
-            Part own{.part = part, .sheets = std::vector<std::vector<oracle::wedge::Triangle>>(silhouette.sheets())};
-            for (std::size_t s = 0; s < silhouette.sheets(); ++s)
+            Part own{.part = part, .sheets = std::vector<oracle::wedge::Sheet>(silhouette.sheets())};
+            for (std::size_t s = 0; s < silhouette.sheets(); ++s) {
+                own.sheets[s].surface = silhouette.sides[s].component;
+                own.sheets[s].turned = silhouette.sides[s].turned;
                 for (std::size_t i = silhouette.facing_begin[s]; i < silhouette.facing_begin[s + 1]; ++i) {
                     oracle::wedge::Triangle triangle;
                     for (std::size_t k = 0; k < 3; ++k) {
                         const Vec3 from = Vec3(topology.vertices()[silhouette.facing[i][k]]) - part.centre;
                         triangle[k] = Vec3(from.dot(frame.u), from.dot(frame.v), from.dot(frame.direction)) / part.half;
                     }
-                    own.sheets[s].push_back(triangle);
+                    own.sheets[s].triangles.push_back(triangle);
                 }
+            }
             parts_.push_back(std::move(own));
         }
     }
@@ -107,12 +130,12 @@ public:
         return seen;
     }
 
-    void forget_a_triangle() { parts_.front().sheets.front().pop_back(); }
+    void forget_a_triangle() { parts_.front().sheets.front().triangles.pop_back(); }
 
 private:
     struct Part {
         LightPart part;
-        std::vector<std::vector<oracle::wedge::Triangle>> sheets;
+        std::vector<oracle::wedge::Sheet> sheets;
     };
     SoftShadowVolume settings_;
     oracle::wedge::Shape shape_;

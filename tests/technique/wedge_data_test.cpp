@@ -92,6 +92,39 @@ TEST(WedgeData, CountsAndPadding)
     EXPECT_EQ(none.sheet_boxes[64], -1.0F);
 }
 
+// What is closed or shows one side alone is one sheet; a surface that shows both sides two, after it, one behind the other.
+TEST(WedgeData, SidesOfSurfacesThatAreNotClosed)
+{
+    const auto sides_of = [](const std::vector<TriangleMesh>& meshes, bool apart = false) {
+        std::vector<int> sides;
+        for (const Sheet& sheet : data_of(meshes, rectangle_light(1, 1), apart).sheets) sides.push_back(sheet.side);
+        return sides;
+    };
+    const TriangleMesh beside = shell({0, 0, 5}, 1, {1, 0, 0}, 4, 8), upright = shell({2, 0, 5}, 1, {2, 0, 5}, 4, 8);
+    TriangleMesh reversed = sheet(-1, 1, -1, 1, 4);
+    for (auto& t : reversed.triangles) std::swap(t[0], t[1]);
+    EXPECT_EQ(sides_of({closed_box({2, 2, 3}, {3, 3, 5}), sheet(-1, 1, -1, 1, 4), reversed, upright}), (std::vector{0}));
+    EXPECT_EQ(sides_of({beside}), (std::vector{1, 2}));
+    EXPECT_EQ(sides_of({beside, sheet(-1, 1, -1, 1, 4), shell({3, 3, 6}, 1, {1, 0, 0}, 4, 8)}), (std::vector{0, 1, 2, 1, 2}));
+    EXPECT_EQ(sides_of({beside}, true), (std::vector{0, 0})); // of other overlaps
+
+    // Each side has all its triangles, and its border: the rim's half and the fold.
+    const WedgeData pair = data_of({beside}, rectangle_light(1, 1), false);
+    EXPECT_EQ(pair.triangle_count, 16u * (2 * 4 - 1)); // at the pole of a quad one triangle is left
+    const std::uint64_t edges = pair.edge_count;
+    EXPECT_EQ(edges, data_of({beside}, rectangle_light(1, 1), true).edge_count);
+    EXPECT_EQ(pair.sheets[1].triangles_begin, pair.sheets[0].triangles_end);
+    EXPECT_EQ(pair.sheets[1].edges_begin, pair.sheets[0].edges_end);
+
+    // All of one side behind the light's plane: the other is the first of its pair.
+    TriangleMesh folded = mesh_of({{3, 0, 3}, {2, -1, -1}, {2, 1, -1}, {5, 0, -2}}, {{0, 1, 2}, {2, 1, 3}});
+    EXPECT_EQ(data_of({folded}, sphere_light(1), false).sheets.size(), 2u); // of a disc everything counts
+    for (int winding = 0; winding < 2; ++winding) {
+        EXPECT_EQ(sides_of({folded}), (std::vector{1}));
+        for (auto& t : folded.triangles) std::swap(t[0], t[1]);
+    }
+}
+
 // In half extents from the part's centre, lower number first.
 TEST(WedgeData, EdgesInTheUnitsOfTheLight)
 {
