@@ -2,42 +2,7 @@
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
-
-// How far above a receiver a texel must be to shadow it: on a plane no texel that the filter compares is.
-//     bound = reach (sx + sy), reach in texels from the receiver to the furthest texel's centre along one axis
-// where the receiver lies on the surface that the map shows there, that is, within one step each way of it; elsewhere the texel's slope says
-// nothing about the receiver. Always, the rounding of both disparities and of the depth that they came from.
-inline float bias_of(const OccluderView occluders, __global const float2* restrict texels, __global const float2* restrict steps,
-                     const float2 position, const float d, const float bias, const float precision, const float reach)
-{
-    const int2 size = (int2)(occluders.width, occluders.height);
-    const int2 place = convert_int2_rtn(position);
-    const bool inside = place.x >= 0 && place.y >= 0 && place.x < size.x && place.y < size.y;
-    const int texel = inside ? place.y * size.x + place.x : 0;
-    const float step = steps[texel].x + steps[texel].y, rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d;
-    const bool on_surface = inside && texels[texel].x > 0.0f && fabs(texels[texel].x - d) <= step + rounding;
-    return rounding + (on_surface ? bias * reach * step : 0.0f);
-}
-
-// 1 where the texel leaves the receiver lit; beyond the map's border nothing casts shadows.
-inline float lit(const int2 size, __global const float2* restrict texels, const int x, const int y, const float limit)
-{
-    const bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
-    return inside && texels[y * size.x + x].x > limit ? 0.0f : 1.0f;
-}
-
-// A receiver's place on the occluder map, in texels; texel (0, 0) reaches from 0 to 1.
-inline float2 place_of(const OccluderView occluders, const float xi, const float eta)
-{
-    return (float2)((xi + 1.0f) * 0.5f * occluders.width, (1.0f - eta) * 0.5f * occluders.height);
-}
-
-// Whether the receiver is there and its filter can meet the map at all (so that the place fits an int).
-inline bool shaded(const OccluderView occluders, const float2 place, const float d)
-{
-    const float margin = 64.0f;
-    return d != NO_RECEIVER && place.x > -margin && place.y > -margin && place.x < occluders.width + margin && place.y < occluders.height + margin;
-}
+#include "common/shadow_test.clh"
 
 // shadow_map_taps: taps x taps comparisons around the receiver, equally weighted (percentage-closer filtering, Reeves et al. 1987, without
 // their jitter); taps = 1 is the hard test.

@@ -68,6 +68,7 @@ struct WorkCheck {
         check_amount("technique.resolution", textures * settings.resolution * settings.resolution, "texels of slices",
                      options.image_samples);
     }
+    void operator()(const Smoothie&) const {}
     void operator()(const RayTraced& settings) const
     {
         check_amount("technique.samples", lights() * pixels() * settings.samples, "rays", options.rays);

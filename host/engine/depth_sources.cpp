@@ -34,7 +34,9 @@ DepthNeeds needs_of(const Technique& technique)
 {
     if (const auto* settings = std::get_if<SoftShadowMap>(&technique))
         return {.front = settings->sides != Sides::back, .back = settings->sides != Sides::front, .receivers = true};
-    return {.front = std::holds_alternative<ShadowMap>(technique), .back = false, .receivers = true};
+    return {.front = std::holds_alternative<ShadowMap>(technique) || std::holds_alternative<Smoothie>(technique),
+            .back = false,
+            .receivers = true};
 }
 
 Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height)

@@ -266,7 +266,8 @@ void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more)
 Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Technique& technique) const
 {
     if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
-    if (std::holds_alternative<SoftShadowVolume>(technique) || std::holds_alternative<OcclusionTexture>(technique))
+    if (std::holds_alternative<SoftShadowVolume>(technique) || std::holds_alternative<OcclusionTexture>(technique) ||
+        std::holds_alternative<Smoothie>(technique))
         return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
     return Prepared(prepare_from_maps(impl_->context, light, occluders, {}, technique));
 }
@@ -296,8 +297,11 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     const Stopwatch watch;
     const Occluders occluders = occluders_with_depth(light, given, geometry, needs_of(technique));
     const Stage render{"render depth", watch.ms(), 0, 0};
-    auto state = prepare_from_maps(impl_->context, light, occluders, geometry.objects(), technique);
+    const auto* smoothie = std::get_if<Smoothie>(&technique);
+    auto state = smoothie ? prepare_smoothies(new_state(impl_->context, light, technique), occluders, geometry, *smoothie)
+                          : prepare_from_maps(impl_->context, light, occluders, geometry.objects(), technique);
     state->stages.insert(state->stages.begin(), render);
+    if (smoothie) return Prepared(state);
     state->covered = !geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view);
     const auto* soft = std::get_if<SoftShadowMap>(&technique);
     if (soft && soft->project && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
@@ -332,6 +336,9 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
 Prepared Engine::prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const
 {
     if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
+    if (std::holds_alternative<Smoothie>(technique))
+        throw Error(ErrorCode::unsupported, "smoothie finds silhouettes on the host and cannot prepare from device buffers",
+                    "prepare it from objects, or from depth maps in memory");
     if (std::holds_alternative<OcclusionTexture>(technique))
         throw Error(ErrorCode::unsupported,
                     "occlusion_texture makes surfaces of depth maps on the host and cannot prepare from device buffers",

@@ -11,4 +11,8 @@ namespace penumbra {
 std::shared_ptr<Prepared::State> prepare_slices(std::shared_ptr<Prepared::State> state, const Occluders& given, const Geometry& geometry,
                                                 const OcclusionTexture& settings);
 
+// smoothie: from the light's view of what casts (front), and silhouettes of the objects that cast, or of that view.
+std::shared_ptr<Prepared::State> prepare_smoothies(std::shared_ptr<Prepared::State> state, const Occluders& occluders,
+                                                   const Geometry& geometry, const Smoothie& settings);
+
 } // namespace penumbra

@@ -36,6 +36,8 @@ void shade_points(opencl::Work& work, const Prepared::State& state, const Receiv
         shade_soft_shadow_volume(work, *wedges, points, visibility, counts);
     else if (const auto* slices = std::get_if<PreparedOcclusionTexture>(&state.data))
         shade_occlusion_texture(work, *slices, points, visibility, counts);
+    else if (const auto* smoothies = std::get_if<PreparedSmoothie>(&state.data))
+        shade_smoothie(work, *smoothies, points, visibility);
     else
         shade_shadow_map(work, std::get<PreparedShadowMap>(state.data), points, visibility);
 }
@@ -62,6 +64,7 @@ const opencl::Specialisation& program_of(const Prepared::State& state)
     if (const auto* soft = std::get_if<PreparedSoftShadowMap>(&state.data)) return soft->program;
     if (const auto* wedges = std::get_if<PreparedSoftShadowVolume>(&state.data)) return wedges->program;
     if (const auto* slices = std::get_if<PreparedOcclusionTexture>(&state.data)) return slices->program;
+    if (const auto* smoothies = std::get_if<PreparedSmoothie>(&state.data)) return smoothies->program;
     return std::get<PreparedShadowMap>(state.data).program;
 }
 

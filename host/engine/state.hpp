@@ -13,6 +13,7 @@
 #include "technique/occlusion_texture.hpp"
 #include "technique/ray_traced.hpp"
 #include "technique/shadow_map.hpp"
+#include "technique/smoothie.hpp"
 #include "technique/soft_shadow_map.hpp"
 #include "technique/soft_shadow_volume.hpp"
 
@@ -34,7 +35,9 @@ struct Prepared::State {
     Camera light_view;                             // of the occluder map; unused by rays
     bool covered = false;                          // every caster is known to lie inside the occluder map
     std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, for `project`; may be null
-    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume, PreparedOcclusionTexture> data;
+    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume, PreparedOcclusionTexture,
+                 PreparedSmoothie>
+        data;
 
     std::vector<Stage> stages;
     double prepare_ms = 0;

@@ -39,6 +39,11 @@ opencl::Specialisation OcclusionTextureConstants::specialisation() const
              {"STORAGE", std::to_string(storage)}}};
 }
 
+opencl::Specialisation SmoothieConstants::specialisation() const
+{
+    return {"smoothie.cl", {{"LANES", std::to_string(lanes)}, {"TILE_ROWS", std::to_string(rows)}}};
+}
+
 std::vector<opencl::Specialisation> every_specialisation()
 {
     std::vector<opencl::Specialisation> all{ReceiversConstants{}.specialisation(), OccludersConstants{}.specialisation(),
@@ -64,6 +69,7 @@ std::vector<opencl::Specialisation> every_specialisation()
             for (const int storage : {0, 1})
                 if (prefilter != 2 || storage == 0)
                     all.push_back(OcclusionTextureConstants{.lanes = lanes, .prefilter = prefilter, .storage = storage}.specialisation());
+    for (const int lanes : {1, 8, 16}) all.push_back(SmoothieConstants{.lanes = lanes}.specialisation());
     return all;
 }
 

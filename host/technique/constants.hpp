@@ -56,6 +56,12 @@ struct OcclusionTextureConstants {
     opencl::Specialisation specialisation() const;
 };
 
+struct SmoothieConstants {
+    int lanes = 16;
+    int rows = tile_rows;
+    opencl::Specialisation specialisation() const;
+};
+
 // What the kernels are built with on some device; the build compiles each.
 std::vector<opencl::Specialisation> every_specialisation();
 

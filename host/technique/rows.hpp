@@ -9,6 +9,7 @@ TechniqueRow shadow_map_row();
 TechniqueRow soft_shadow_map_row();
 TechniqueRow soft_shadow_volume_row();
 TechniqueRow occlusion_texture_row();
+TechniqueRow smoothie_row();
 TechniqueRow ray_traced_row();
 
 } // namespace penumbra

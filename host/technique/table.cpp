@@ -75,8 +75,8 @@ const SettingKey& key_of(const TechniqueRow& row, const std::string& name)
 
 std::span<const TechniqueRow> technique_table()
 {
-    static const std::vector<TechniqueRow> table{shadow_map_row(), soft_shadow_map_row(), soft_shadow_volume_row(), occlusion_texture_row(),
-                                                 ray_traced_row()};
+    static const std::vector<TechniqueRow> table{shadow_map_row(),        soft_shadow_map_row(), soft_shadow_volume_row(),
+                                                 occlusion_texture_row(), smoothie_row(),        ray_traced_row()};
     return table;
 }
 

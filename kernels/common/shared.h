@@ -110,4 +110,17 @@ typedef struct {
     int combine;                  // 0 product, 1 sum, 2 max, 3 layered, 4 layered_max
 } OcclusionLight;
 
+// Smoothies' buffers: the occluder map's texels, in tangents of the light's view (orthographic: lengths).
+#define SMOOTHIE_GROUP 16
+typedef struct {
+    int width, height;
+    float left, top, step_x, step_y; // tangent of texel x, y's middle: left + x step_x, top - y step_y
+    float fixed_width;               // t, as a tangent; 0: from the light
+    float light;                     // half the light's size; orthographic: the tangent of half its angle
+    int orthographic;
+    int groups;                      // of silhouette edges
+    int two_sided;
+    int sinusoidal;                  // fall-off; else linear
+} SmoothieView;
+
 #endif

@@ -45,7 +45,8 @@ TEST(Table, HasTheTechniquesOfThePublicHeader)
         kinds.insert(row.kind);
         structs.insert(row.defaults.index());
     }
-    EXPECT_EQ(kinds, (std::set<std::string_view>{"shadow_map", "soft_shadow_map", "soft_shadow_volume", "occlusion_texture", "ray_traced"}));
+    EXPECT_EQ(kinds, (std::set<std::string_view>{"shadow_map", "soft_shadow_map", "soft_shadow_volume", "occlusion_texture", "smoothie",
+                                                 "ray_traced"}));
     EXPECT_EQ(structs.size(), std::variant_size_v<Technique>);
 }
 
@@ -132,7 +133,8 @@ TEST(Table, UnknownNamesListTheKnown)
     const Error kind = error_of([] { technique_from({.kind = "soft_shadow_mpa", .settings = {}}); });
     EXPECT_EQ(kind.code(), ErrorCode::invalid_input);
     EXPECT_TRUE(holds(kind.message(), "technique.kind") && holds(kind.message(), "soft_shadow_mpa")) << kind.what();
-    EXPECT_TRUE(holds(kind.hint(), "shadow_map, soft_shadow_map, soft_shadow_volume, occlusion_texture, ray_traced")) << kind.what();
+    EXPECT_TRUE(holds(kind.hint(), "shadow_map, soft_shadow_map, soft_shadow_volume, occlusion_texture, smoothie, ray_traced"))
+        << kind.what();
     // Not built yet is unknown, like a typo (contract.md, section 2).
     EXPECT_EQ(error_of([] { technique_from({.kind = "auto", .settings = {}}); }).code(), ErrorCode::invalid_input);
 

@@ -72,12 +72,30 @@ struct OcclusionTexture {
     int resolution = 256;   // texels along each side of a slice
     Prefilter prefilter = Prefilter::nbuffer;          // 3.2
     LevelStorage storage = LevelStorage::normalized16; // of N-buffers and mip-maps
-    Combine combine = Combine::product; // of slices (3.3, Eq. 5); layered: the sum within each depth layer, the product or the greatest across them
-    int layers = 4;                     // layered: depth layers, the last of which takes all that lies behind
-    bool leak_fix = false;              // each slice is seen in the next one away from the light too (3.4.1)
+    Combine combine =
+        Combine::product;  // of slices (3.3, Eq. 5); layered: the sum within each depth layer, the product or the greatest across them
+    int layers = 4;        // layered: depth layers, the last of which takes all that lies behind
+    bool leak_fix = false; // each slice is seen in the next one away from the light too (3.4.1)
     SelfShadow self_shadow =
         SelfShadow::fade; // 3.4.2: fade: a receiver's own slice is left out and the one before fades in with the distance from it
     int light_splits = 1; // n x n parts of a rectangle, each with slices of its own
+};
+
+enum class SmoothieWidth { light, t };
+enum class SilhouetteSource { object, image };
+enum class Falloff { sinusoidal, linear };
+
+// Smoothies (Chan, Durand, Rendering Fake Soft Shadows with Smoothies, 2003): a shadow map whose silhouettes wear fins that fade to light
+// outwards.
+struct Smoothie {
+    SmoothieWidth t_from =
+        SmoothieWidth::light; // light: a smoothie is as wide as the outer half of the penumbra that the light's size casts
+    double t = 0.05;          // t_from t: the paper's t, where the light's image is 2 wide along its wider side
+    SilhouetteSource silhouettes =
+        SilhouetteSource::object;          // of the objects that cast (section 3), or of the depth map (the authors' wish, section 6)
+    Falloff falloff = Falloff::sinusoidal; // 3.1
+    bool two_sided = false;                // beyond the paper: an inner fin too, half lit at the silhouette
+    double bias = 1.0;                     // as of ShadowMap
 };
 
 // Shadow rays (Embree) through the scene's objects: the reference. Stratified over the light and seeded.
@@ -88,7 +106,7 @@ struct RayTraced {
     std::int64_t seed = 1;
 };
 
-using Technique = std::variant<ShadowMap, SoftShadowMap, SoftShadowVolume, OcclusionTexture, RayTraced>;
+using Technique = std::variant<ShadowMap, SoftShadowMap, SoftShadowVolume, OcclusionTexture, Smoothie, RayTraced>;
 
 // The typed settings of a request, and back. Throws invalid_input for an unknown kind or key (naming the known ones), a value of the
 // wrong type or out of range.

@@ -1,0 +1,254 @@
+// Smoothies (Chan, Durand: Rendering Fake Soft Shadows with Smoothies, 2003): a shadow map whose silhouettes wear fins, which fade from dark to light outwards.
+//
+// A smoothie's edge has alpha = dot(p - v, n) / t, a corner |v - p| / t (section 3.1): in both, the distance in the light's image from the nearest point of the
+// silhouette, over t. So the least over all edges of the distance from the edge, as a segment, is what the paper's quadrilaterals give, at corners of any number of
+// edges too.
+//
+// Specialisation constants
+//   LANES      texels a work-item owns side by side
+//   TILE_ROWS  as in soft_shadow_map.cl
+#include "common/shared.h"
+#include "occluders.cl"
+#include "receivers.cl"
+#include "common/shadow_test.clh"
+#include "common/bits.clh"
+#include "common/lanes.clh"
+
+#define BUFFER_ROWS 8 // of texels, that a work-item owns
+
+// receiver_depths: the nearest and the furthest receiver in each texel, as the bits of their disparities (positive floats are in the order of their bits).
+//
+//   nearest, furthest [height][width]   0 and the bits of NO_RECEIVER at first
+//
+// Launched over the receivers.
+__kernel void receiver_depths(const ReceiverView receivers, const OccluderView occluders, __global const float* restrict xi,
+                              __global const float* restrict eta, __global const float* restrict d, __global int* restrict nearest,
+                              __global int* restrict furthest)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= receivers.width || y >= receivers.height) return;
+    const int at = y * receivers.stride + x;
+    const float2 place = place_of(occluders, xi[at], eta[at]);
+    if (d[at] == NO_RECEIVER || !(place.x >= 0.0f && place.y >= 0.0f && place.x < occluders.width && place.y < occluders.height)) return;
+    const int texel = (int)place.y * occluders.width + (int)place.x;
+    atomic_max((volatile __global int*)nearest + texel, as_int(d[at]));
+    atomic_min((volatile __global int*)furthest + texel, as_int(d[at]));
+}
+
+// spread_receivers: a texel without receivers takes those of the texels around it, so that receivers seen by a camera with fewer pixels leave no holes.
+//
+// Launched over the texels.
+__kernel void spread_receivers(const int2 size, __global const int* restrict nearest, __global const int* restrict furthest, __global int* restrict to_nearest,
+                               __global int* restrict to_furthest)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    int near = nearest[y * size.x + x], far = furthest[y * size.x + x];
+    if (near == 0)
+        for (int j = max(y - 1, 0); j <= min(y + 1, size.y - 1); ++j)
+            for (int i = max(x - 1, 0); i <= min(x + 1, size.x - 1); ++i) {
+                near = max(near, nearest[j * size.x + i]);
+                far = min(far, furthest[j * size.x + i]);
+            }
+    to_nearest[y * size.x + x] = near;
+    to_furthest[y * size.x + x] = far;
+}
+
+// How wide the penumbra outside a silhouette at disparity b is on a receiver at r: t (1 - b / r) of depths (Eq. 1), or from the light's size, half of
+// what it casts: h (1 / z_b - 1 / z_r). Not positive where the receiver is no further than the silhouette.
+inline floatn width_of(const SmoothieView view, const floatn b, const floatn r)
+{
+    if (view.fixed_width > 0.0f) return view.fixed_width * (1.0f - r / b);
+    return view.light * (view.orthographic ? 1.0f / r - 1.0f / b : b - r);
+}
+
+// The nearest point of an edge to each of LANES texels.
+typedef struct {
+    floatn x, y, distance, b;
+} Nearest;
+
+// `edge`: both ends' x and y, both disparities, 1 / length^2 (0 of a point).
+__attribute__((always_inline)) inline Nearest nearest_of(__global const float* edge, const floatn x, const floatn y)
+{
+    const float ax = edge[0], ay = edge[1], dx = edge[2] - ax, dy = edge[3] - ay;
+    const floatn at = saturate(fma(x - ax, (floatn)(dx), (y - ay) * dy) * edge[6]);
+    Nearest n;
+    n.x = fma(at, (floatn)(dx), (floatn)(ax));
+    n.y = fma(at, (floatn)(dy), (floatn)(ay));
+    n.b = fma(at, (floatn)(edge[5] - edge[4]), (floatn)(edge[4]));
+    const floatn out_x = x - n.x, out_y = y - n.y;
+    n.distance = sqrt(fma(out_x, out_x, out_y * out_y));
+    return n;
+}
+
+// Sixteen boxes of edges, five rows of 16: low x, high x, low y, high y, greatest disparity. All ones where a smoothie in the box can reach the texels within
+// [x0, x1] x [y0, y1], of receivers no further than disparity r.
+inline int16 reach(const SmoothieView view, __global const float* boxes, const float x0, const float x1, const float y0, const float y1, const float r)
+{
+    const float16 near = vload16(4, boxes);
+    float16 width = (float16)(view.fixed_width);
+    if (view.fixed_width == 0.0f) width = view.light * (view.orthographic ? (float16)(1.0f / fmax(r, 0x1p-120f)) : near);
+    width = width * (1.0f + 0x1p-18f) + 0x1p-18f * (fabs(x0) + fabs(x1) + fabs(y0) + fabs(y1));
+    return (vload16(1, boxes) + width >= x0) & (vload16(0, boxes) - width <= x1) & (vload16(3, boxes) + width >= y0) & (vload16(2, boxes) - width <= y1) & (near > 0.0f);
+}
+
+// The furthest that the map shows just outside an edge's nearest point, within six texels along its outward normal: edges of a mesh zigzag about the outline that
+// the map shows by about the length of one. 0 where nothing is.
+inline floatn beyond(const SmoothieView view, __global const float* edge, const Nearest n, __global const float2* texels)
+{
+    const float dx = edge[2] - edge[0], dy = edge[3] - edge[1], per = sqrt(edge[6]) * 1.5f;
+    float x[LANES], y[LANES], found[LANES];
+    store_lanes((n.x - view.left) / view.step_x, x);
+    store_lanes((view.top - n.y) / view.step_y, y);
+    for (int lane = 0; lane < LANES; ++lane) {
+        found[lane] = NO_RECEIVER;
+        for (int step = 1; step <= 4; ++step) {
+            const int i = (int)rint(clamp(x[lane] + step * dy * per, -1.0f, (float)view.width));
+            const int j = (int)rint(clamp(y[lane] + step * dx * per, -1.0f, (float)view.height));
+            found[lane] = fmin(found[lane], i >= 0 && j >= 0 && i < view.width && j < view.height ? texels[j * view.width + i].x : 0.0f);
+        }
+    }
+    return load_lanes(found);
+}
+
+inline void store_texels(__global float* to, const floatn values, const int left)
+{
+    float lanes[LANES];
+    store_lanes(values, lanes);
+    for (int lane = 0; lane < LANES && lane < left; ++lane) to[lane] = lanes[lane];
+}
+
+// smoothie_buffer: the least remapped alpha of each texel and the disparity of the smoothie it belongs to (minimum blending, 3.1); smoothies behind the map's
+// blocker, and behind the receiver, are dropped.
+//
+//   boxes, edge_boxes, edges     of groups, blocks of 16; of the edges of each group; [groups][16][8]
+//   texels                       the occluder map: disparity, covered share
+//   nearest, furthest            disparities of the nearest and the furthest receiver, as bits
+//   alphas, depths [height][width]             alpha 1, disparity 0 where there is no smoothie
+//   inner_distances, inner_depths   two_sided: distance from the silhouette on its inner side (negative: none), and its disparity
+//
+// Launched over work-items, (width / LANES) x (height / BUFFER_ROWS), both rounded up.
+__kernel void smoothie_buffer(const SmoothieView view, __global const float* restrict boxes, __global const float* restrict edge_boxes,
+                              __global const float* restrict edges, __global const float2* restrict texels, __global const int* restrict nearest,
+                              __global const int* restrict furthest, __global float* restrict alphas, __global float* restrict depths,
+                              __global float* restrict inner_distances, __global float* restrict inner_depths)
+{
+    const int first_x = get_global_id(0) * LANES, first_y = get_global_id(1) * BUFFER_ROWS;
+    if (first_x >= view.width || first_y >= view.height) return;
+    const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
+    floatn alpha[BUFFER_ROWS], depth[BUFFER_ROWS], inner[BUFFER_ROWS], share[BUFFER_ROWS], inner_depth[BUFFER_ROWS], r[BUFFER_ROWS], behind[BUFFER_ROWS], map[BUFFER_ROWS];
+    floatn x, least = (floatn)(NO_RECEIVER);
+    float columns[LANES];
+    for (int lane = 0; lane < LANES; ++lane) columns[lane] = view.left + (first_x + lane) * view.step_x;
+    x = load_lanes(columns);
+    for (int row = 0; row < BUFFER_ROWS; ++row) {
+        float rs[LANES], fs[LANES], maps[LANES];
+        for (int lane = 0; lane < LANES; ++lane) {
+            const int at = min(first_y + row, view.height - 1) * view.width + min(first_x + lane, view.width - 1);
+            rs[lane] = as_float(nearest[at]);
+            // Where no receiver is anywhere near nobody looks.
+            fs[lane] = nearest[at] == 0 ? 0.0f : as_float(furthest[at]);
+            maps[lane] = texels[at].x;
+        }
+        r[row] = load_lanes(rs);
+        behind[row] = load_lanes(fs);
+        map[row] = load_lanes(maps);
+        least = select_lanes(least, behind[row], behind[row] < least);
+        alpha[row] = one;
+        depth[row] = inner_depth[row] = zero;
+        inner[row] = -one;
+        share[row] = one;
+    }
+    float far[LANES];
+    store_lanes(least, far);
+    for (int lane = 1; lane < LANES; ++lane) far[0] = fmin(far[0], far[lane]);
+    const float x0 = columns[0], x1 = columns[LANES - 1];
+    const float y1 = view.top - first_y * view.step_y, y0 = view.top - (first_y + BUFFER_ROWS - 1) * view.step_y;
+
+    for (int block = 0; block < view.groups; block += 16) {
+        uint group_bits = bits_of(reach(view, boxes + block * 5, x0, x1, y0, y1, far[0]));
+        while (group_bits) {
+            const int group = block + take_bit(&group_bits);
+            uint bits = bits_of(reach(view, edge_boxes + group * 80, x0, x1, y0, y1, far[0]));
+            while (bits) {
+                __global const float* edge = edges + (group * SMOOTHIE_GROUP + take_bit(&bits)) * 8;
+                for (int row = 0; row < BUFFER_ROWS; ++row) {
+                    const floatn y = (floatn)(view.top - (first_y + row) * view.step_y);
+                    const Nearest n = nearest_of(edge, x, y);
+                    const floatn width = width_of(view, n.b, r[row]);
+                    const intn kept = (n.distance < alpha[row] * width) & (n.b >= map[row]);
+                    alpha[row] = select_lanes(alpha[row], n.distance / width, kept);
+                    depth[row] = select_lanes(depth[row], n.b, kept);
+                    if (!view.two_sided) continue;
+                    // On the blocker's side, where light gets past the silhouette to the furthest receiver: what the map shows beyond does not hide it.
+                    const float dx = edge[2] - edge[0], dy = edge[3] - edge[1];
+                    const floatn full = width_of(view, n.b, behind[row]);
+                    intn within = (map[row] > zero) & ((x - n.x) * dy - (y - n.y) * dx <= zero) & (n.distance < share[row] * full);
+                    if (NONE(within)) continue;
+                    within &= beyond(view, edge, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
+                    share[row] = select_lanes(share[row], n.distance / full, within);
+                    inner[row] = select_lanes(inner[row], n.distance, within);
+                    inner_depth[row] = select_lanes(inner_depth[row], n.b, within);
+                }
+            }
+        }
+    }
+    for (int row = 0; row < BUFFER_ROWS && first_y + row < view.height; ++row) {
+        const int at = (first_y + row) * view.width + first_x, left = view.width - first_x;
+        store_texels(alphas + at, alpha[row], left);
+        store_texels(depths + at, depth[row], left);
+        if (!view.two_sided) continue;
+        store_texels(inner_distances + at, inner[row], left);
+        store_texels(inner_depths + at, inner_depth[row], left);
+    }
+}
+
+inline float width_at(const SmoothieView view, const float b, const float r)
+{
+    if (view.fixed_width > 0.0f) return view.fixed_width * (1.0f - r / b);
+    return view.light * (view.orthographic ? 1.0f / r - 1.0f / b : b - r);
+}
+
+// smoothie_composite: the three cases of Fig. 3 at the four nearest texels, blended (section 3, step 5), then the fall-off.
+//
+//   visibility [height][width]
+//
+// Launched over the receivers.
+__kernel void smoothie_composite(const ReceiverView receivers, const OccluderView occluders, const SmoothieView view, const float bias, const float precision,
+                                 __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict alphas,
+                                 __global const float* restrict depths, __global const float* restrict inner_distances,
+                                 __global const float* restrict inner_depths, __global const float* restrict xi,
+                                 __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= receivers.width || y >= receivers.height) return;
+    const int at = y * receivers.stride + x;
+    const float2 place = place_of(occluders, xi[at], eta[at]);
+    float seen = 1.0f;
+    if (shaded(occluders, place, d[at])) {
+        const float rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d[at];
+        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 1.0f);
+        const int2 low = convert_int2_rtn(place - 0.5f);
+        const float2 part = place - 0.5f - convert_float2(low);
+        seen = 0.0f;
+        for (int j = 0; j < 2; ++j)
+            for (int i = 0; i < 2; ++i) {
+                const int tx = low.x + i, ty = low.y + j, texel = ty * occluders.width + tx;
+                float v = 1.0f;
+                if (tx >= 0 && ty >= 0 && tx < occluders.width && ty < occluders.height) {
+                    const bool hidden = texels[texel].x > limit;
+                    if (hidden) {
+                        v = 0.0f;
+                        if (view.two_sided && inner_distances[texel] >= 0.0f && inner_depths[texel] > limit)
+                            v = fmax(0.5f - 0.5f * inner_distances[texel] / width_at(view, inner_depths[texel], d[at]), 0.0f);
+                    } else if (depths[texel] > d[at] + rounding) {
+                        v = view.two_sided ? 0.5f + 0.5f * alphas[texel] : alphas[texel];
+                    }
+                }
+                seen += v * (i ? part.x : 1.0f - part.x) * (j ? part.y : 1.0f - part.y);
+            }
+        seen = fmin(seen, 1.0f);
+        if (view.sinusoidal) seen = 0.5f - 0.5f * cospi(seen);
+    }
+    visibility[y * receivers.width + x] = seen;
+}
