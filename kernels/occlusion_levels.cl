@@ -30,7 +30,7 @@ inline float unpacked(const element e) { return e; }
 
 // Whether a texel's slice is filled. `layer`: -1, or that the slice be the column's filled one of this number, counted from the light; the last layer, `last`, takes
 // all further ones. `leak_fix` (3.4.1): each slice is seen in the next one away from the light too.
-inline bool filled(__global const uint* occupancy, const int2 size, const int x, const int y, const int slice, const int layer, const int last, const int leak_fix)
+inline __attribute__((always_inline)) bool filled(__global const uint* occupancy, const int2 size, const int x, const int y, const int slice, const int layer, const int last, const int leak_fix)
 {
     const int at = y * size.x + x;
     const ulong bits = occupancy[at] | (ulong)occupancy[at + size.x * size.y] << 32;
@@ -131,7 +131,7 @@ inline floatn mean_of_table(__global const uint* table, const int2 size, const f
 
 #else
 
-inline __global element* level_of(__global element* data, const OcclusionLevel level, const int texture)
+inline __attribute__((always_inline)) __global element* level_of(__global element* data, const OcclusionLevel level, const int texture)
 {
     return data + (long)level.offset * LEVEL_BLOCK + (long)texture * level.rows * level.stride;
 }
@@ -151,7 +151,7 @@ __kernel void first_level(const int2 size, const int textures, const int last, c
 }
 
 // Sixteen stored values of a row from x on; nothing beyond what is stored.
-inline float16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+inline __attribute__((always_inline)) float16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
 {
     if (y < 0 || y >= level.height) return (float16)(0.0f);
     __global const element* row = texels + y * level.stride;
@@ -165,13 +165,13 @@ inline float16 stored_row(__global const element* texels, const OcclusionLevel l
     return vload16(0, values);
 }
 
-inline float stored(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+inline __attribute__((always_inline)) float stored(__global const element* texels, const OcclusionLevel level, const int x, const int y)
 {
     return x >= 0 && y >= 0 && x < level.width && y < level.height ? unpacked(texels[y * level.stride + x]) : 0.0f;
 }
 
 // Sixteen values of a level from the level below.
-inline float16 next_row(__global const element* from, const OcclusionLevel below, const OcclusionLevel level, const int apart, const int x, const int y)
+inline __attribute__((always_inline)) float16 next_row(__global const element* from, const OcclusionLevel below, const OcclusionLevel level, const int apart, const int x, const int y)
 {
     const int dx = (below.width - level.width) / 2, dy = (below.height - level.height) / 2;
 #if PREFILTER == 0
@@ -207,7 +207,7 @@ inline float16 next_row(__global const element* from, const OcclusionLevel below
 // Launched over (stored columns / 16) x (stored rows x textures).
 __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level, const int textures, const int apart, __global element* restrict data)
 {
-    const int x = get_global_id(0) * 16, y = get_global_id(1) % level.rows, texture = get_global_id(1) / level.rows;
+    const int x = get_global_id(0) * 16, row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
     if (x >= level.stride || texture >= textures) return;
     const float16 values = next_row(level_of(data, below, texture), below, level, apart, x, y);
     __global element* to = level_of(data, level, texture) + y * level.stride + x;
@@ -220,15 +220,79 @@ __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level,
 
 // Of a kernel larger than the highest level's, which holds the whole window: the part of that level that lies inside the kernel, by moving it so that their nearer
 // borders meet; then it is thinned by their sizes.
-inline floatn moved(const floatn at, const int size, const floatn over)
+inline __attribute__((always_inline)) floatn moved(const floatn at, const int size, const floatn over)
 {
     const floatn middle = (floatn)(0.5f * size), away = at - middle, zero = (floatn)(0.0f), rest = fabs(away) - over;
     return middle + copysign(select_lanes(zero, rest, rest > zero), away);
 }
 
-// A texture around a place, in texels, for a kernel of `size` texels: bilinear within a level, linear between two (3.2).
-inline floatn mean_of_levels(__global const OcclusionLevel* levels, const int count, const int2 window, __global const element* data, const int texture,
-                             const floatn at_x, const floatn at_y, const floatn size)
+// log2 of 1 or more: 2 / ln 2 atanh(s), s = (m - 1) / (m + 1), with m from sqrt(1/2) to sqrt(2), so that |s| <= 0.1716. The first term left out, 2 / ln 2 s^9 / 9, is
+// below 2^-24. (PoCL's own log2 of a vector takes its lanes one by one.)
+inline __attribute__((always_inline)) floatn log2_of(const floatn value)
+{
+    const intn bits = as_intn(value), exponent = (bits - 0x3f3504f3) >> 23; // of sqrt(1/2), less a half: 0x3f3504f3
+    const floatn m = as_floatn(bits - (exponent << 23));
+    const floatn s = (m - 1.0f) / (m + 1.0f), t = s * s;
+    const floatn series = fma(t, fma(t, fma(t, (floatn)(1.0f / 7), (floatn)(1.0f / 5)), (floatn)(1.0f / 3)), (floatn)(1.0f));
+    return fma(s * 0x1.715476p+1f, series, convert_floatn(exponent));
+}
+
+// Where in a level a place of the window lies: the texel below and the way to the next one. Beyond what is stored lies nothing, as in its first and last texels.
+typedef struct {
+    intn texel;
+    floatn part;
+} LevelPlace;
+
+inline __attribute__((always_inline)) LevelPlace level_place(const floatn at, const float scale, const float shift, const int stored, intn* within)
+{
+    const floatn zero = (floatn)(0.0f), last = (floatn)(stored - 1.0f), place = fma(at, (floatn)(scale), (floatn)(shift));
+    *within = place > zero & place < last;
+    const floatn low = select_lanes(zero, place, place > zero), inside = select_lanes(last, low, low < last);
+    LevelPlace found;
+    found.texel = min(convert_intn(inside), (intn)(stored - 2));
+    found.part = inside - convert_floatn(found.texel);
+    return found;
+}
+
+// Between four texels, the first of which is at `places`.
+inline __attribute__((always_inline)) floatn bilinear(__global const element* texels, const int stride, const intn places, const floatn across, const floatn up)
+{
+    int at[LANES];
+    store_int_lanes(places, at);
+#if STORAGE == 1
+    // Two neighbours a load.
+    int low[LANES], high[LANES];
+    for (int lane = 0; lane < LANES; ++lane) low[lane] = as_int(vload2(0, texels + at[lane]));
+    for (int lane = 0; lane < LANES; ++lane) high[lane] = as_int(vload2(0, texels + at[lane] + stride));
+    const intn below = load_lanes(low), above = load_lanes(high);
+#ifdef __ENDIAN_LITTLE__
+#define FIRST_OF(pair) convert_floatn((pair)&0xffff)
+#define SECOND_OF(pair) convert_floatn((pair) >> 16 & 0xffff)
+#else
+#define FIRST_OF(pair) convert_floatn((pair) >> 16 & 0xffff)
+#define SECOND_OF(pair) convert_floatn((pair)&0xffff)
+#endif
+    const floatn below_left = FIRST_OF(below), below_right = SECOND_OF(below), above_left = FIRST_OF(above), above_right = SECOND_OF(above);
+    const float unit = 1.0f / 65535.0f;
+#else
+    float values[4][LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+        values[0][lane] = texels[at[lane]];
+        values[1][lane] = texels[at[lane] + 1];
+        values[2][lane] = texels[at[lane] + stride];
+        values[3][lane] = texels[at[lane] + stride + 1];
+    }
+    const floatn below_left = load_lanes(values[0]), below_right = load_lanes(values[1]), above_left = load_lanes(values[2]), above_right = load_lanes(values[3]);
+    const float unit = 1.0f;
+#endif
+    const floatn below_mean = fma(across, below_right - below_left, below_left), above_mean = fma(across, above_right - above_left, above_left);
+    return fma(up, above_mean - below_mean, below_mean) * unit;
+}
+
+// A texture around a place, in texels, for a kernel of `size` texels: bilinear within a level, linear between two (3.2). Neighbours' kernels are of about one size: each
+// level that any of them needs is looked up for all at once, so that its layout is the same for all and only the loads are one by one.
+inline __attribute__((always_inline)) floatn mean_of_levels(__global const OcclusionLevel* levels, const int count, const int2 window, __global const element* data,
+                                                            const int texture, const floatn at_x, const floatn at_y, const floatn size)
 {
     const floatn one = (floatn)(1.0f), zero = (floatn)(0.0f), most = (floatn)(count - 1);
     const floatn highest = (floatn)((float)(1 << (count - 1))), excess = select_lanes(zero, 0.5f * (size - highest), size > highest);
@@ -236,34 +300,25 @@ inline floatn mean_of_levels(__global const OcclusionLevel* levels, const int co
     const floatn thinner = select_lanes(one, highest / size, size > highest);
 #if PREFILTER == 3
     // A square of `size` stands for a disc of that diameter, whose variance is size^2 / 16 along each axis; level l has (4^l - 1) / 3.
-    const floatn place = 0.5f * log2(fma(size * size, (floatn)(3.0f / 16.0f), one));
+    const floatn place = 0.5f * log2_of(fma(size * size, (floatn)(3.0f / 16.0f), one));
 #else
-    const floatn place = log2(select_lanes(one, size, size > one));
+    const floatn place = log2_of(select_lanes(one, size, size > one));
 #endif
     const floatn level = select_lanes(most, place, place < most);
-    const intn lower = convert_intn(level);
-    const floatn part = level - convert_floatn(lower);
-    int numbers[LANES];
-    float place_x[LANES], place_y[LANES], parts[LANES], found[LANES];
-    store_int_lanes(lower, numbers);
-    store_lanes(x, place_x);
-    store_lanes(y, place_y);
-    store_lanes(part, parts);
-    for (int lane = 0; lane < LANES; ++lane) {
-        float means[2];
-        for (int i = 0; i < 2; ++i) {
-            const OcclusionLevel l = levels[min(numbers[lane] + i, count - 1)];
-            __global const element* texels = data + (long)l.offset * LEVEL_BLOCK + (long)texture * l.rows * l.stride;
-            const float px = clamp(fma(place_x[lane], l.scale, l.shift), 0.0f, l.width - 1.0f), py = clamp(fma(place_y[lane], l.scale, l.shift), 0.0f, l.height - 1.0f);
-            const int ix = min((int)px, l.width - 2), iy = min((int)py, l.height - 2);
-            __global const element* low = texels + iy * l.stride + ix;
-            __global const element* high = low + l.stride;
-            const float fx = px - ix, fy = py - iy;
-            means[i] = mix(mix(unpacked(low[0]), unpacked(low[1]), fx), mix(unpacked(high[0]), unpacked(high[1]), fx), fy);
-        }
-        found[lane] = mix(means[0], means[1], parts[lane]);
+    floatn sum = zero;
+    for (int i = 0; i < count; ++i) {
+        const floatn weight = one - fabs(level - (float)i);
+        const intn counts = weight > zero;
+        if (NONE(counts)) continue;
+        const OcclusionLevel l = levels[i];
+        intn within_x, within_y;
+        const LevelPlace column = level_place(x, l.scale, l.shift, l.width, &within_x), row = level_place(y, l.scale, l.shift, l.height, &within_y);
+        const intn meets = counts & within_x & within_y;
+        if (NONE(meets)) continue;
+        __global const element* texels = data + (long)l.offset * LEVEL_BLOCK + (long)texture * l.rows * l.stride;
+        sum = fma(select_lanes(zero, weight, counts), bilinear(texels, l.stride, row.texel * l.stride + column.texel, column.part, row.part), sum);
     }
-    return load_lanes(found) * (thinner * thinner);
+    return sum * (thinner * thinner);
 }
 
 #endif
