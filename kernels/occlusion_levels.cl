@@ -19,24 +19,42 @@
 #if PREFILTER == 2
 typedef uint element;
 #elif STORAGE == 1
+// 65535 is all of a texel. Sums of a few are whole numbers; a quarter goes to the nearest, halves to the even one.
 typedef ushort element;
-inline element packed(const float value) { return convert_ushort_sat_rte(value * 65535.0f); }
-inline float unpacked(const element e) { return e * (1.0f / 65535.0f); }
+typedef uint stored;
+typedef uint16 stored16;
+#define ALL_FILLED 65535
+#define STORED16 convert_uint16
+#define ELEMENT16 convert_ushort16
+#define QUARTER(sum) (((sum) + 1u + ((sum) >> 2 & 1u)) >> 2)
+#define ROUNDED16(value) convert_uint16(rint(value))
 #else
 typedef float element;
-inline element packed(const float value) { return value; }
-inline float unpacked(const element e) { return e; }
+typedef float stored;
+typedef float16 stored16;
+#define ALL_FILLED 1.0f
+#define STORED16
+#define ELEMENT16
+#define QUARTER(sum) (0.25f * (sum))
+#define ROUNDED16(value) (value)
 #endif
+
+// Columns that a work-item makes where all sixteen could be made at once.
+#define COLUMNS (LANES == 1 ? 1 : 16)
 
 // Whether a texel's slice is filled. `layer`: -1, or that the slice be the column's filled one of this number, counted from the light; the last layer, `last`, takes
 // all further ones. `leak_fix` (3.4.1): each slice is seen in the next one away from the light too.
-inline __attribute__((always_inline)) bool filled(__global const uint* occupancy, const int2 size, const int x, const int y, const int slice, const int layer, const int last, const int leak_fix)
+inline __attribute__((always_inline)) bool filled(__global const uint* occupancy, const int2 size, const int x, const int y, const int slice, const int layer,
+                                                  const int last, const int leak_fix)
 {
-    const int at = y * size.x + x;
-    const ulong bits = occupancy[at] | (ulong)occupancy[at + size.x * size.y] << 32;
+    const int at = y * size.x + x, words = size.x * size.y;
+    if (layer < 0) {
+        const uint own = occupancy[at + (slice >> 5) * words] >> (slice & 31), before = slice > 0 ? slice - 1 : 0;
+        return (own | (leak_fix ? occupancy[at + (int)(before >> 5) * words] >> (before & 31) : 0)) & 1;
+    }
+    const ulong bits = occupancy[at] | (ulong)occupancy[at + words] << 32;
     const ulong all = leak_fix ? bits | bits << 1 : bits;
     if (!(all >> slice & 1)) return false;
-    if (layer < 0) return true;
     const int before = popcount(all & (((ulong)1 << slice) - 1));
     return layer == last ? before >= last : before == layer;
 }
@@ -138,64 +156,65 @@ inline __attribute__((always_inline)) __global element* level_of(__global elemen
 
 // first_level: the textures themselves, with the padding around.
 //
-// Launched over stored columns x (stored rows x textures).
+// Launched over stored columns x (stored rows x textures); a work-item makes COLUMNS of them, the others between do nothing.
 __kernel void first_level(const int2 size, const int textures, const int last, const int leak_fix, const OcclusionLevel level,
                           __global const OcclusionPlane* restrict planes, __global const uint* restrict occupancy, __global element* restrict data)
 {
-    const int x = get_global_id(0), y = get_global_id(1) % level.rows, texture = get_global_id(1) / level.rows;
-    if (x >= level.stride || texture >= textures) return;
+    const int x = get_global_id(0), row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
+    if (x % COLUMNS != 0 || x >= level.stride || texture >= textures) return;
     const int inside_x = x - (level.width - size.x) / 2, inside_y = y - (level.height - size.y) / 2;
-    const bool there = inside_x >= 0 && inside_y >= 0 && inside_x < size.x && inside_y < size.y;
-    level_of(data, level, texture)[y * level.stride + x] =
-        packed(there && filled(occupancy, size, inside_x, inside_y, planes[texture].slice, planes[texture].layer, last, leak_fix) ? 1.0f : 0.0f);
+    __global element* to = level_of(data, level, texture) + y * level.stride + x;
+    for (int i = 0; i < COLUMNS; ++i) to[i] = 0;
+    if (inside_y < 0 || inside_y >= size.y) return;
+    const int slice = planes[texture].slice, layer = planes[texture].layer, from = max(0, -inside_x), end = min(COLUMNS, size.x - inside_x);
+    for (int i = from; i < end; ++i)
+        to[i] = filled(occupancy, size, inside_x + i, inside_y, slice, layer, last, leak_fix) ? ALL_FILLED : 0;
 }
 
-// Sixteen stored values of a row from x on; nothing beyond what is stored.
-inline __attribute__((always_inline)) float16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+// Sixteen stored values of a row from x on; nothing beyond what is stored. Columns from the level's width to its stride hold nothing as well.
+inline __attribute__((always_inline)) stored16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
 {
-    if (y < 0 || y >= level.height) return (float16)(0.0f);
+    if (y < 0 || y >= level.height || x <= -16 || x >= level.stride) return (stored16)(0);
     __global const element* row = texels + y * level.stride;
-#if STORAGE == 1
-    if (x >= 0 && x + 16 <= level.width) return convert_float16(vload16(0, row + x)) * (1.0f / 65535.0f);
-#else
-    if (x >= 0 && x + 16 <= level.width) return vload16(0, row + x);
-#endif
-    float values[16];
-    for (int i = 0; i < 16; ++i) values[i] = x + i >= 0 && x + i < level.width ? unpacked(row[x + i]) : 0.0f;
+    if (x >= 0 && x + 16 <= level.stride) return STORED16(vload16(0, row + x));
+    stored values[16];
+    for (int i = 0; i < 16; ++i) values[i] = x + i >= 0 && x + i < level.stride ? row[x + i] : 0;
     return vload16(0, values);
 }
 
-inline __attribute__((always_inline)) float stored(__global const element* texels, const OcclusionLevel level, const int x, const int y)
+inline __attribute__((always_inline)) stored stored_at(__global const element* texels, const OcclusionLevel level, const int x, const int y)
 {
-    return x >= 0 && y >= 0 && x < level.width && y < level.height ? unpacked(texels[y * level.stride + x]) : 0.0f;
+    return x >= 0 && y >= 0 && x < level.width && y < level.height ? texels[y * level.stride + x] : 0;
 }
 
 // Sixteen values of a level from the level below.
-inline __attribute__((always_inline)) float16 next_row(__global const element* from, const OcclusionLevel below, const OcclusionLevel level, const int apart, const int x, const int y)
+inline __attribute__((always_inline)) stored16 next_row(__global const element* from, const OcclusionLevel below, const OcclusionLevel level, const int apart,
+                                                        const int x, const int y)
 {
     const int dx = (below.width - level.width) / 2, dy = (below.height - level.height) / 2;
 #if PREFILTER == 0
     const int before = apart > 0 ? apart : 1, left = x + dx - before, right = x + dx + apart, low = y + dy - before, high = y + dy + apart;
-    return 0.25f * ((stored_row(from, below, left, low) + stored_row(from, below, right, low)) +
-                    (stored_row(from, below, left, high) + stored_row(from, below, right, high)));
+    return QUARTER((stored_row(from, below, left, low) + stored_row(from, below, right, low)) +
+                   (stored_row(from, below, left, high) + stored_row(from, below, right, high)));
 #elif PREFILTER == 1
     (void)apart, (void)dx, (void)dy;
-    float values[16];
+    stored sums[16];
     for (int i = 0; i < 16; ++i) {
         const int left = 2 * (x + i) - 1, low = 2 * y - 1; // both levels have one column and row of nothing before the first
-        values[i] = 0.25f * ((stored(from, below, left, low) + stored(from, below, left + 1, low)) +
-                             (stored(from, below, left, low + 1) + stored(from, below, left + 1, low + 1)));
+        sums[i] = (stored_at(from, below, left, low) + stored_at(from, below, left + 1, low)) +
+                  (stored_at(from, below, left, low + 1) + stored_at(from, below, left + 1, low + 1));
     }
-    return vload16(0, values);
+    return QUARTER(vload16(0, sums));
 #else
+    // The weights are binary fractions: the sums stay below 65535 and a half.
     const float weights[5] = {0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f};
     float16 sum = (float16)(0.0f);
     for (int j = 0; j < 5; ++j) {
         float16 row = (float16)(0.0f);
-        for (int i = 0; i < 5; ++i) row += weights[i] * stored_row(from, below, x + dx + (i - 2) * apart, y + dy + (j - 2) * apart);
+        for (int i = 0; i < 5; ++i) row += weights[i] * convert_float16(stored_row(from, below, x + dx + (i - 2) * apart, y + dy + (j - 2) * apart));
         sum += weights[j] * row;
     }
-    return sum;
+    return ROUNDED16(sum);
 #endif
 }
 
@@ -209,13 +228,8 @@ __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level,
 {
     const int x = get_global_id(0) * 16, row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
     if (x >= level.stride || texture >= textures) return;
-    const float16 values = next_row(level_of(data, below, texture), below, level, apart, x, y);
-    __global element* to = level_of(data, level, texture) + y * level.stride + x;
-#if STORAGE == 1
-    vstore16(convert_ushort16_sat_rte(values * 65535.0f), 0, to);
-#else
-    vstore16(values, 0, to);
-#endif
+    const stored16 values = next_row(level_of(data, below, texture), below, level, apart, x, y);
+    vstore16(ELEMENT16(values), 0, level_of(data, level, texture) + y * level.stride + x);
 }
 
 // Of a kernel larger than the highest level's, which holds the whole window: the part of that level that lies inside the kernel, by moving it so that their nearer
