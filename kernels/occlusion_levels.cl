@@ -23,18 +23,22 @@ typedef uint element;
 typedef ushort element;
 typedef uint stored;
 typedef uint16 stored16;
+typedef ushort16 element16;
 #define ALL_FILLED 65535
 #define STORED16 convert_uint16
 #define ELEMENT16 convert_ushort16
+#define SELECTOR as_uint16
 #define QUARTER(sum) (((sum) + 1u + ((sum) >> 2 & 1u)) >> 2)
 #define ROUNDED16(value) convert_uint16(rint(value))
 #else
 typedef float element;
 typedef float stored;
 typedef float16 stored16;
+typedef float16 element16;
 #define ALL_FILLED 1.0f
 #define STORED16
 #define ELEMENT16
+#define SELECTOR
 #define QUARTER(sum) (0.25f * (sum))
 #define ROUNDED16(value) (value)
 #endif
@@ -171,15 +175,16 @@ __kernel void first_level(const int2 size, const int textures, const int last, c
         to[i] = filled(occupancy, size, inside_x + i, inside_y, slice, layer, last, leak_fix) ? ALL_FILLED : 0;
 }
 
-// Sixteen stored values of a row from x on; nothing beyond what is stored. Columns from the level's width to its stride hold nothing as well.
+// Sixteen stored values of a row from x on; nothing beyond what is stored. The first and the last row and column hold nothing, and so do columns from the level's
+// width to its stride: between these rows what is loaded beyond a row's ends is a part of the rows beside it.
 inline __attribute__((always_inline)) stored16 stored_row(__global const element* texels, const OcclusionLevel level, const int x, const int y)
 {
-    if (y < 0 || y >= level.height || x <= -16 || x >= level.stride) return (stored16)(0);
-    __global const element* row = texels + y * level.stride;
-    if (x >= 0 && x + 16 <= level.stride) return STORED16(vload16(0, row + x));
-    stored values[16];
-    for (int i = 0; i < 16; ++i) values[i] = x + i >= 0 && x + i < level.stride ? row[x + i] : 0;
-    return vload16(0, values);
+    const stored16 nothing = (stored16)(0);
+    if (y <= 0 || y >= level.height - 1 || x <= -16 || x >= level.stride) return nothing;
+    const stored16 values = STORED16(vload16(0, texels + y * level.stride + x));
+    if (x >= 0 && x + 16 <= level.stride) return values;
+    const int16 column = x + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    return select(nothing, values, SELECTOR(column >= 0 && column < level.stride));
 }
 
 inline __attribute__((always_inline)) stored stored_at(__global const element* texels, const OcclusionLevel level, const int x, const int y)
@@ -226,10 +231,13 @@ inline __attribute__((always_inline)) stored16 next_row(__global const element* 
 // Launched over (stored columns / 16) x (stored rows x textures).
 __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level, const int textures, const int apart, __global element* restrict data)
 {
-    const int x = get_global_id(0) * 16, row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
+    // Items of a work-group stand above each other; let them follow each other along rows, as memory does.
+    const int number = get_global_id(0) * get_local_size(1) + get_local_id(1), chunks = get_global_size(0), along = number / chunks;
+    const int x = (number - along * chunks) * 16, row = get_group_id(1) * get_local_size(1) + along, texture = row / level.rows, y = row - texture * level.rows;
     if (x >= level.stride || texture >= textures) return;
     const stored16 values = next_row(level_of(data, below, texture), below, level, apart, x, y);
-    vstore16(ELEMENT16(values), 0, level_of(data, level, texture) + y * level.stride + x);
+    // Rows begin at multiples of sixteen elements: one aligned store, where vstore16 would store one by one.
+    *(__global element16*)(level_of(data, level, texture) + y * level.stride + x) = ELEMENT16(values);
 }
 
 // Of a kernel larger than the highest level's, which holds the whole window: the part of that level that lies inside the kernel, by moving it so that their nearer
