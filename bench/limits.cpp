@@ -62,9 +62,11 @@ Report dense_pairs(const Engine& engine)
     return best;
 }
 
-} // namespace
+struct Rates {
+    double gflops = 0, gigabytes = 0;
+};
 
-void limits(const Engine& engine)
+Rates rates_of(const Engine& engine)
 {
     const auto context = opencl::Context::open(std::to_string(engine.device().index));
     const cl::CommandQueue queue = context->queue();
@@ -81,8 +83,17 @@ void limits(const Engine& engine)
     arithmetic.setArg(2, rounds);
     memory.setArg(0, a);
     memory.setArg(1, b);
-    const double gflops = 2.0 * 16 * 8 * rounds * items / best_ms(queue, arithmetic, items) * 1e-6;
-    const double gigabytes = 2.0 * copied * 64 / best_ms(queue, memory, copied) * 1e-6;
+    return {.gflops = 2.0 * 16 * 8 * rounds * items / best_ms(queue, arithmetic, items) * 1e-6,
+            .gigabytes = 2.0 * copied * 64 / best_ms(queue, memory, copied) * 1e-6};
+}
+
+} // namespace
+
+double copy_rate(const Engine& engine) { return rates_of(engine).gigabytes; }
+
+void limits(const Engine& engine)
+{
+    const auto [gflops, gigabytes] = rates_of(engine);
 
     const Report dense = dense_pairs(engine);
     const double pairs_per_s = static_cast<double>(dense.pairs) / (dense.total_ms * 1e-3);

@@ -31,6 +31,11 @@ constexpr Case cases[] = {
     {"wedge_culling", wedge_culling, "soft_shadow_volume: what each culling spares (Papers II and IV); the light's size"},
     {"wedge_models", wedge_models, "soft_shadow_volume on five meshes, beside soft_shadow_map and Embree's"},
     {"wedge_growth", wedge_growth, "soft_shadow_volume: time over silhouette edges, and over receivers"},
+    {"occlusion", occlusion, "occlusion_texture: its settings, beside the other techniques and Embree's"},
+    {"occlusion_filters", occlusion_filters, "N-buffers, mip-maps, summed-area tables: error, roughness, bandwidth (Fig. 2)"},
+    {"occlusion_light", occlusion_light, "occlusion_texture: error and time over the light's size; the sun"},
+    {"occlusion_casters", occlusion_casters, "occlusion_texture: time over triangles and bunnies (Figs. 12, 13)"},
+    {"occlusion_sheet", occlusion_sheet, "occlusion_texture: a tilted sheet in 4 to 64 slices"},
     {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},
 };
@@ -38,7 +43,7 @@ constexpr Case cases[] = {
 int usage()
 {
     std::fputs("usage: penumbra_bench BENCH...\n", stderr);
-    for (const Case& c : cases) std::fprintf(stderr, "  %-14s %s\n", c.name, c.meaning);
+    for (const Case& c : cases) std::fprintf(stderr, "  %-17s %s\n", c.name, c.meaning);
     return 2;
 }
 
