@@ -62,10 +62,7 @@ void prepare_maps(opencl::Work& work, const OccluderDepth& depth, Prepared::Stat
     } else {
         state.data = prepare_shadow_map(work, depth, std::get<ShadowMap>(state.technique));
     }
-    add_stages(state.stages, work.finish());
-    state.prepare_ms = work_ms(state.stages);
-    state.peak_bytes = work.memory().peak;
-    state.memory = work.memory_ptr();
+    finish_prepare(work, state);
 }
 
 bool inside_view(const Projected& p) { return p.depth > 0 && std::abs(p.x_px - 1) <= 1 && std::abs(p.y_px - 1) <= 1; }
@@ -146,68 +143,6 @@ std::shared_ptr<Prepared::State> prepare_from_maps(const std::shared_ptr<const o
     return state;
 }
 
-// Surfaces that the occluder maps show, where there are no objects: every map's sheets of texels.
-Topology topology_of_maps(const Occluders& occluders, const Camera& camera)
-{
-    std::vector<TriangleMesh> meshes{mesh_of_texels(*occluders.front, camera)};
-    for (const DepthMap& layer : occluders.layers) meshes.push_back(mesh_of_texels(layer, camera));
-    std::vector<const TriangleMesh*> pointers;
-    for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
-    return Topology(pointers);
-}
-
-void warn_of_edges(const Topology& topology, Prepared::State& state)
-{
-    const auto warn = [&](std::uint64_t count, const char* what) {
-        if (count > 0) state.warnings.push_back(std::to_string(count) + what);
-    };
-    warn(topology.open_edges(),
-         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast "
-         "(overlap sum: of the two the one that hides more counts)");
-    warn(topology.nonmanifold_edges(),
-         " edges of the casters have more than two triangles: they count as silhouettes where the facing ones do not cancel");
-    warn(topology.left_out(), " triangles without area were left out");
-}
-
-std::shared_ptr<Prepared::State> prepare_wedges(std::shared_ptr<Prepared::State> state, const Occluders& given, const Geometry& geometry,
-                                                const SoftShadowVolume& settings)
-{
-    const Light& light = state->light;
-    const bool meshes = geometry.state().any(&Object::casts);
-    if (!meshes && !given.front)
-        throw Error(ErrorCode::invalid_input,
-                    "objects: soft_shadow_volume needs objects that cast or occluders.depth.front, and there are neither",
-                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
-    state->light_view = wedge_view(light);
-    state->covered = true;
-
-    Stopwatch watch;
-    std::shared_ptr<const Topology> topology;
-    Vec2 texel{0, 0};
-    if (meshes) {
-        topology = geometry.state().topology();
-        warn_of_edges(*topology, *state);
-    } else {
-        check_size(*given.front, given.width, given.height, "occluders.depth.front");
-        const Camera camera = occluder_camera(light, given.camera, {}, given.width, given.height);
-        topology = std::make_shared<const Topology>(topology_of_maps(given, camera));
-        texel = {2 * camera.half_extent.x / given.width, 2 * camera.half_extent.y / given.height};
-    }
-    state->stages.push_back({"topology", watch.ms(), 0, topology->bytes()});
-
-    opencl::Work work(state->context);
-    work.stage("prepare");
-    PreparedSoftShadowVolume prepared = prepare_soft_shadow_volume(work, light, {.topology = *topology, .texel = texel}, settings);
-    state->warnings.insert(state->warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
-    if (prepared.triangles == 0) state->warnings.push_back("no triangle faces the light: nothing casts shadows");
-    state->data = std::move(prepared);
-    add_stages(state->stages, work.finish());
-    state->prepare_ms = work_ms(state->stages);
-    state->peak_bytes = work.memory().peak;
-    state->memory = work.memory_ptr();
-    return state;
-}
-
 std::shared_ptr<Prepared::State> prepare_from_objects(std::shared_ptr<Prepared::State> state, const Geometry& geometry,
                                                       const RayTraced& settings)
 {
@@ -261,6 +196,24 @@ void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more)
         same->device_ms += stage.device_ms;
         same->bytes += stage.bytes;
     }
+}
+
+void finish_prepare(opencl::Work& work, Prepared::State& state)
+{
+    add_stages(state.stages, work.finish());
+    state.prepare_ms = work_ms(state.stages);
+    state.peak_bytes = work.memory().peak;
+    state.memory = work.memory_ptr();
+}
+
+bool casts_or_shown(const Geometry& geometry, const Occluders& given, const char* technique)
+{
+    const bool objects = geometry.state().any(&Object::casts);
+    if (!objects && !given.front)
+        throw Error(ErrorCode::invalid_input,
+                    std::string("objects: ") + technique + " needs objects that cast or occluders.depth.front, and there are neither",
+                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
+    return objects;
 }
 
 Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Technique& technique) const
@@ -325,10 +278,7 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     opencl::Work work(state->context);
     work.stage("prepare");
     state->data = with_emission_of(work, std::get<PreparedSoftShadowVolume>(before.data), state->light);
-    add_stages(state->stages, work.finish());
-    state->prepare_ms = work_ms(state->stages);
-    state->peak_bytes = work.memory().peak;
-    state->memory = work.memory_ptr();
+    finish_prepare(work, *state);
     state->shared = before.shared ? before.shared : before.memory;
     return Prepared(state);
 }

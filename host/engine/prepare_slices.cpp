@@ -1,5 +1,3 @@
-#include <penumbra/error.hpp>
-
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/prepare.hpp"
@@ -32,11 +30,7 @@ std::shared_ptr<Prepared::State> prepare_slices(std::shared_ptr<Prepared::State>
                                                 const OcclusionTexture& settings)
 {
     const Light& light = state->light;
-    const bool objects = geometry.state().any(&Object::casts);
-    if (!objects && !given.front)
-        throw Error(ErrorCode::invalid_input,
-                    "objects: occlusion_texture needs objects that cast or occluders.depth.front, and there are neither",
-                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
+    const bool objects = casts_or_shown(geometry, given, "occlusion_texture");
     state->covered = true;
 
     std::vector<TriangleMesh> surfaces;
@@ -62,10 +56,7 @@ std::shared_ptr<Prepared::State> prepare_slices(std::shared_ptr<Prepared::State>
     state->warnings.insert(state->warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     state->notes = prepared.notes;
     state->data = std::move(prepared);
-    add_stages(state->stages, work.finish());
-    state->prepare_ms = work_ms(state->stages);
-    state->peak_bytes = work.memory().peak;
-    state->memory = work.memory_ptr();
+    finish_prepare(work, *state);
     return state;
 }
 

@@ -1,7 +1,5 @@
 #include <algorithm>
 
-#include <penumbra/error.hpp>
-
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/prepare.hpp"
@@ -64,10 +62,7 @@ std::shared_ptr<Prepared::State> prepare_smoothies(std::shared_ptr<Prepared::Sta
                                     .front = front.memory(),
                                     .back = {}},
                                    edges, settings);
-    add_stages(state->stages, work.finish());
-    state->prepare_ms = work_ms(state->stages);
-    state->peak_bytes = work.memory().peak;
-    state->memory = work.memory_ptr();
+    finish_prepare(work, *state);
     return state;
 }
 
