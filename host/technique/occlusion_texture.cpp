@@ -285,7 +285,6 @@ Scenery scenery_of(opencl::Work& work, const LightFrame& frame, std::span<const 
     scenery.range = slice_range(scenery.casters, frame.directional);
     if (!(scenery.range.near <= scenery.range.far) || (!frame.directional && !(scenery.range.far > 0))) return scenery;
     scenery.depths = slice_depths(scenery.casters, scenery.range, settings.slices, settings.placement, frame.directional);
-    work.stage("upload casters");
     scenery.vertices = work.upload(std::span<const float>(scenery.casters.vertices), "vertices");
     scenery.triangles = work.upload(std::span<const cl_int>(scenery.casters.triangles), "triangles");
     scenery.large = work.buffer<cl_int>(scenery.casters.triangles.size() / 3, "large triangles");
@@ -335,6 +334,7 @@ TechniqueRow occlusion_texture_row()
 PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
                                                    const SolidMaps* solid, const OcclusionTexture& settings)
 {
+    work.stage("casters");
     LightFrame frame = light_frame(light);
     check_settings(frame, settings);
     const LevelKind kind = level_kind(frame, settings);
