@@ -30,42 +30,25 @@ inline void set_bit(__global uint* occupancy, const SliceView view, const int x,
     atomic_or(word, 1u << (slice & 31));
 }
 
-// A triangle as lines from the centre of projection see it: e = n.x tx + n.y ty + n.z for each side, all of one sign where a line meets the triangle.
+// A triangle from the centre of projection (orthographic: from the view's own centre).
 typedef struct {
-    float3 side[3];     // opposite the vertex of that number
-    float3 z;           // of the vertices
-    float volume;       // perspective: six times the volume between centre and triangle
-    int2 low, high;     // texels whose middles it can cover
+    float3 corner[3];
+    int2 low, high; // texels whose middles it can cover
 } Outline;
-
-inline float3 side_of(const SliceView view, const float3 a, const float3 b)
-{
-    // Without fma: exchanged ends give the same with the other sign, to the bit.
-    if (view.orthographic) return (float3)(a.y - b.y, b.x - a.x, a.x * b.y - a.y * b.x);
-    return (float3)(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
 
 inline Outline outline_of(const SliceView view, __global const float* vertices, __global const int* triangle)
 {
     Outline o;
-    float3 v[3];
     float2 low = (float2)(NO_RECEIVER), high = (float2)(-NO_RECEIVER);
     bool whole = false; // reaches behind the centre of projection: its outline is no triangle
     for (int i = 0; i < 3; ++i) {
-        v[i] = vload3(triangle[i], vertices);
-        v[i].x -= view.centre_x;
-        v[i].y -= view.centre_y;
-        v[i].z += view.behind;
-        const float scale = view.orthographic ? 1.0f : 1.0f / v[i].z;
-        whole |= !view.orthographic && !(v[i].z > 0.0f);
-        low = fmin(low, v[i].xy * scale);
-        high = fmax(high, v[i].xy * scale);
+        const float3 v = vload3(triangle[i], vertices) + (float3)(-view.centre_x, -view.centre_y, view.behind);
+        const float scale = view.orthographic ? 1.0f : 1.0f / v.z;
+        whole |= !view.orthographic && !(v.z > 0.0f);
+        low = fmin(low, v.xy * scale);
+        high = fmax(high, v.xy * scale);
+        o.corner[i] = v;
     }
-    o.z = (float3)(v[0].z, v[1].z, v[2].z);
-    o.side[0] = side_of(view, v[1], v[2]);
-    o.side[1] = side_of(view, v[2], v[0]);
-    o.side[2] = side_of(view, v[0], v[1]);
-    o.volume = v[0].x * o.side[0].x + v[0].y * o.side[0].y + v[0].z * o.side[0].z;
     const float2 corner = (float2)(view.low_x, view.low_y), per = (float2)(view.per_x, view.per_y), size = (float2)(view.width, view.height);
     // A texel further each way: rounding must not lose one.
     const float2 first = clamp((low - corner) * per - 1.5f, (float2)(0.0f), size), last = clamp((high - corner) * per + 1.5f, (float2)(0.0f), size);
@@ -74,25 +57,36 @@ inline Outline outline_of(const SliceView view, __global const float* vertices, 
     return o;
 }
 
-// Where exactly one of two triangles beside a side has a line that meets the side.
-inline bool inside(const float3 side, const float e) { return e > 0.0f || (e == 0.0f && (side.x > 0.0f || (side.x == 0.0f && side.y > 0.0f))); }
+// a.x b.y - a.y b.x to within two units in the last place (Kahan), so that its sign is that of the exact value and 0 only where that is.
+inline float cross2(const float2 a, const float2 b)
+{
+    const float second = a.y * b.x;
+    return fma(a.x, b.y, -second) + fma(-a.y, b.x, second);
+}
 
+// Whether the origin lies inside of a side from a to b, `area` being their cross product. An origin on the side counts as moved along +x, or where the side runs along
+// x along +y: it lies inside of exactly one of two triangles beside the side.
+inline bool inside(const float area, const float2 a, const float2 b) { return area > 0.0f || (area == 0.0f && (a.y > b.y || (a.y == b.y && b.x > a.x))); }
+
+// Corners are rounded once for a texel's line and for all triangles that share them, and sides are judged exactly: neighbours leave no gap and a closed surface is
+// met an even number of times.
 inline void mark_row(const Outline o, const SliceView view, __global const float* depths, __global uint* occupancy, const int y)
 {
     const float ty = view.low_y + (y + 0.5f) / view.per_y;
     const float nearest = depths[0], furthest = depths[view.slices];
+    const float3 away = view.orthographic ? (float3)(1.0f) : (float3)(o.corner[0].z, o.corner[1].z, o.corner[2].z);
     for (int x = o.low.x; x < o.high.x; ++x) {
         const float tx = view.low_x + (x + 0.5f) / view.per_x;
-        float e[3];
-        for (int i = 0; i < 3; ++i) e[i] = o.side[i].x * tx + o.side[i].y * ty + o.side[i].z;
-        const bool one_way = inside(o.side[0], e[0]) && inside(o.side[1], e[1]) && inside(o.side[2], e[2]);
-        const bool other_way = inside(-o.side[0], -e[0]) && inside(-o.side[1], -e[1]) && inside(-o.side[2], -e[2]);
+        // The corners from the point of the line at their depth.
+        const float2 a = o.corner[0].xy - (float2)(tx, ty) * away.x, b = o.corner[1].xy - (float2)(tx, ty) * away.y, c = o.corner[2].xy - (float2)(tx, ty) * away.z;
+        const float bc = cross2(b, c), ca = cross2(c, a), ab = cross2(a, b);
+        const bool one_way = inside(bc, b, c) && inside(ca, c, a) && inside(ab, a, b);
+        const bool other_way = inside(-bc, c, b) && inside(-ca, a, c) && inside(-ab, b, a);
         if (!one_way && !other_way) continue;
-        const float sum = e[0] + e[1] + e[2];
-        const float from = fmin(o.z.x, fmin(o.z.y, o.z.z)), to = fmax(o.z.x, fmax(o.z.y, o.z.z));
-        float z = (view.orthographic ? e[0] * o.z.x + e[1] * o.z.y + e[2] * o.z.z : o.volume) / sum;
+        const float3 z3 = (float3)(o.corner[0].z, o.corner[1].z, o.corner[2].z);
+        const float sum = bc + ca + ab, from = fmin(z3.x, fmin(z3.y, z3.z)), to = fmax(z3.x, fmax(z3.y, z3.z));
         // Edge-on to the line the depth is anywhere on it.
-        z = sum == 0.0f ? from : clamp(z, from, to);
+        float z = sum == 0.0f ? from : clamp((bc * z3.x + ca * z3.y + ab * z3.z) / sum, from, to);
         z -= view.behind;
         // The planes' own rounding, and that of adding `behind` and taking it away.
         const float rounding = 0x1p-21f * (fabs(z) + view.behind);

@@ -35,7 +35,8 @@ inline floatn hidden(const OcclusionLight light, const OcclusionPlane plane, con
 {
     const floatn x = fma(p.tx, (floatn)(plane.at_x), (floatn)(light.zero_x)), y = fma(p.ty, (floatn)(plane.at_y), (floatn)(light.zero_y));
     const floatn rise = light.orthographic ? p.z - plane.far : fma((floatn)(-plane.far), p.d, (floatn)(1.0f));
-    const floatn half_x = rise * plane.half_x, half_y = rise * plane.half_y;
+    // From before the plane (a receiver inside its own slice) a point of it is seen.
+    const floatn grown = select_lanes((floatn)(0.0f), rise, rise > (floatn)(0.0f)), half_x = grown * plane.half_x, half_y = grown * plane.half_y;
 #if PREFILTER == 2
     (void)levels;
     return mean_of_table(data + (long)number * (size.x + 1) * (size.y + 1), size, x, y, half_x, half_y);
