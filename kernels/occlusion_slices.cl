@@ -11,7 +11,7 @@
 #define SMALL_TEXELS 1024
 
 // The slice that holds a depth within the first and the last plane; the last one holds the last plane too.
-inline int slice_of(__global const float* depths, const int slices, const float z)
+__attribute__((always_inline)) inline int slice_of(__global const float* depths, const int slices, const float z)
 {
     int low = 0, high = slices - 1;
     while (low < high) {
@@ -24,7 +24,7 @@ inline int slice_of(__global const float* depths, const int slices, const float 
     return low;
 }
 
-inline void set_bit(__global uint* occupancy, const SliceView view, const int x, const int y, const int slice)
+__attribute__((always_inline)) inline void set_bit(__global uint* occupancy, const SliceView view, const int x, const int y, const int slice)
 {
     volatile __global uint* word = occupancy + ((slice >> 5) * view.height + y) * view.width + x;
     atomic_or(word, 1u << (slice & 31));
@@ -36,7 +36,7 @@ typedef struct {
     int2 low, high; // texels whose middles it can cover
 } Outline;
 
-inline Outline outline_of(const SliceView view, __global const float* vertices, __global const int* triangle)
+__attribute__((always_inline)) inline Outline outline_of(const SliceView view, __global const float* vertices, __global const int* triangle)
 {
     Outline o;
     float2 low = (float2)(NO_RECEIVER), high = (float2)(-NO_RECEIVER);
@@ -50,8 +50,9 @@ inline Outline outline_of(const SliceView view, __global const float* vertices, 
         o.corner[i] = v;
     }
     const float2 corner = (float2)(view.low_x, view.low_y), per = (float2)(view.per_x, view.per_y), size = (float2)(view.width, view.height);
-    // A texel further each way: rounding must not lose one.
-    const float2 first = clamp((low - corner) * per - 1.5f, (float2)(0.0f), size), last = clamp((high - corner) * per + 1.5f, (float2)(0.0f), size);
+    // Those whose middles lie within, and a 64th of a texel further each way: rounding, of some 2^-22 of at most 4096 texels, must not lose one.
+    const float2 first = clamp(ceil((low - corner) * per - 0.515625f), (float2)(0.0f), size);
+    const float2 last = clamp(floor((high - corner) * per + 0.515625f), (float2)(0.0f), size);
     o.low = whole ? (int2)(0) : convert_int2(first);
     o.high = whole ? (int2)(view.width, view.height) : convert_int2(last);
     return o;
@@ -66,11 +67,11 @@ inline float cross2(const float2 a, const float2 b)
 
 // Whether the origin lies inside of a side from a to b, `area` being their cross product. An origin on the side counts as moved along +x, or where the side runs along
 // x along +y: it lies inside of exactly one of two triangles beside the side.
-inline bool inside(const float area, const float2 a, const float2 b) { return area > 0.0f || (area == 0.0f && (a.y > b.y || (a.y == b.y && b.x > a.x))); }
+__attribute__((always_inline)) inline bool inside(const float area, const float2 a, const float2 b) { return area > 0.0f || (area == 0.0f && (a.y > b.y || (a.y == b.y && b.x > a.x))); }
 
 // Corners are rounded once for a texel's line and for all triangles that share them, and sides are judged exactly: neighbours leave no gap and a closed surface is
 // met an even number of times.
-inline void mark_row(const Outline o, const SliceView view, __global const float* depths, __global uint* occupancy, const int y)
+__attribute__((always_inline)) inline void mark_row(const Outline o, const SliceView view, __global const float* depths, __global uint* occupancy, const int y)
 {
     const float ty = view.low_y + (y + 0.5f) / view.per_y;
     const float nearest = depths[0], furthest = depths[view.slices];

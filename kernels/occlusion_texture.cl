@@ -17,7 +17,7 @@ typedef struct {
     floatn tx, ty, d, z;
 } Seen;
 
-inline Seen seen_at(const OcclusionLight light, __global const float* xi, __global const float* eta, __global const float* d)
+__attribute__((always_inline)) inline Seen seen_at(const OcclusionLight light, __global const float* xi, __global const float* eta, __global const float* d)
 {
     Seen p;
     p.d = load_lanes(d);
@@ -30,7 +30,7 @@ inline Seen seen_at(const OcclusionLight light, __global const float* xi, __glob
 
 // How much of the light a texture hides (Eq. 4 gives the kernel's size): its mean over the rectangle where the receiver's view of the light meets the
 // slice's far plane.
-inline floatn hidden(const OcclusionLight light, const OcclusionPlane plane, const int number, const Seen p, const int2 size,
+__attribute__((always_inline)) inline floatn hidden(const OcclusionLight light, const OcclusionPlane plane, const int number, const Seen p, const int2 size,
                      __global const OcclusionLevel* levels, __global const element* data)
 {
     const floatn x = fma(p.tx, (floatn)(plane.at_x), (floatn)(light.zero_x)), y = fma(p.ty, (floatn)(plane.at_y), (floatn)(light.zero_y));
