@@ -138,9 +138,10 @@ __kernel void slice_large(const SliceView view, __global const float* restrict v
 // line inside a slice, looked up at the slice's middle.
 //
 //   map_size, per_map   of the maps; texels of the maps a tangent of the light's view (orthographic: a length)
+//   from                where the maps' camera stands in light space; depth in them counts from there (perspective: the light's centre, 0)
 //
 // Launched over the window, width x height.
-__kernel void fill_between(const SliceView view, const int2 map_size, const float2 per_map, __global const float* restrict front,
+__kernel void fill_between(const SliceView view, const int2 map_size, const float2 per_map, const float4 from, __global const float* restrict front,
                            __global const float* restrict back, __global const float* restrict depths, __global uint* restrict occupancy)
 {
     const int x = get_global_id(0), y = get_global_id(1);
@@ -149,12 +150,14 @@ __kernel void fill_between(const SliceView view, const int2 map_size, const floa
     for (int slice = 0; slice < view.slices; ++slice) {
         const float z = 0.5f * (depths[slice] + depths[slice + 1]);
         const float away = view.orthographic ? 1.0f : z + view.behind, per_away = view.orthographic ? 1.0f : 1.0f / z;
-        const float map_x = fma(fma(tx, away, view.centre_x) * per_away, per_map.x, 0.5f * map_size.x);
-        const float map_y = fma(-fma(ty, away, view.centre_y) * per_away, per_map.y, 0.5f * map_size.y);
+        const float map_x = fma((fma(tx, away, view.centre_x) - from.x) * per_away, per_map.x, 0.5f * map_size.x);
+        const float map_y = fma((from.y - fma(ty, away, view.centre_y)) * per_away, per_map.y, 0.5f * map_size.y);
         if (!(map_x >= 0.0f && map_y >= 0.0f && map_x < map_size.x && map_y < map_size.y)) continue;
         const int at = (int)map_y * map_size.x + (int)map_x;
         const float near = front[at], far = back[at];
-        if (near > 0.0f && near < INFINITY && far > 0.0f && far < INFINITY && far >= depths[slice] && near <= depths[slice + 1])
+        if (!(near > 0.0f && near < INFINITY && far > 0.0f && far < INFINITY)) continue;
+        // From the front's slice to the back's: what lies on a plane between two belongs to the further one, as with surfaces.
+        if (far + from.z >= depths[slice] && (near + from.z < depths[slice + 1] || slice + 1 == view.slices))
             set_bit(occupancy, view, x, y, slice);
     }
 }

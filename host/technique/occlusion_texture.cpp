@@ -126,8 +126,10 @@ void mark_solid(opencl::Work& work, const opencl::Specialisation& program, const
     const auto& [front, back, camera] = *scenery.solid;
     const cl_float2 per{
         {static_cast<float>(front.width / (2 * camera.half_extent.x)), static_cast<float>(front.height / (2 * camera.half_extent.y))}};
+    const Vec3 origin = light_from_world(scenery.light, camera.frame.origin);
+    const cl_float4 from{{static_cast<float>(origin.x), static_cast<float>(origin.y), static_cast<float>(origin.z), 0}};
     const std::size_t side = static_cast<std::size_t>(view.width);
-    work.launch(program, "fill_between", {side, side}, {16, 1}, side * side * 8, view, cl_int2{{front.width, front.height}}, per,
+    work.launch(program, "fill_between", {side, side}, {16, 1}, side * side * 8, view, cl_int2{{front.width, front.height}}, per, from,
                 scenery.front, scenery.back, scenery.planes, occupancy);
 }
 
@@ -172,18 +174,52 @@ LevelLayout layout_of(const Marked& marked, LevelKind kind)
     return level_layout(levels, marked.view.width, kind);
 }
 
-void check_memory(const opencl::Context& context, std::uint64_t bytes, const OcclusionTexture& settings)
+// What the same slices would take with `side` texels: kernels have fewer texels in proportion.
+std::uint64_t elements_at(Marked marked, int side, LevelKind kind, bool directional)
+{
+    const float scale = static_cast<float>(side) / static_cast<float>(marked.view.width);
+    marked.view.width = marked.view.height = side;
+    for (OcclusionPlane& plane : marked.planes) {
+        plane.half_x *= scale;
+        plane.half_y *= scale;
+    }
+    set_levels(marked, kind, directional);
+    return layout_of(marked, kind).elements;
+}
+
+// A hint that holds: resolutions are tried, and slices counted as the largest of them, the nearest.
+std::string what_fits(const Marked& marked, std::uint64_t most, LevelKind kind, bool directional, const OcclusionTexture& settings)
+{
+    int fits = 0;
+    for (int low = 4, high = settings.resolution; low <= high;) {
+        const int side = (low + high) / 2;
+        if (elements_at(marked, side, kind, directional) <= most) {
+            fits = side;
+            low = side + 1;
+        } else {
+            high = side - 1;
+        }
+    }
+    Marked nearest = marked;
+    nearest.planes.resize(1);
+    const bool layered = settings.combine == Combine::layered || settings.combine == Combine::layered_max;
+    const std::uint64_t slices = most / layout_of(nearest, kind).elements / static_cast<std::uint64_t>(layered ? settings.layers : 1);
+    if (fits == 0)
+        return slices == 0 ? "expected fewer slices and a lower resolution" : "expected at most " + std::to_string(slices) + " slices";
+    return "a resolution of " + std::to_string(fits) + " would fit" +
+           (slices == 0 ? "" : ", or " + std::to_string(std::min(slices, static_cast<std::uint64_t>(settings.slices))) + " slices");
+}
+
+void check_memory(const opencl::Context& context, const Marked& marked, std::uint64_t elements, LevelKind kind, bool directional,
+                  const OcclusionTexture& settings)
 {
     const DeviceInfo& device = context.info();
-    const std::uint64_t most = std::min(device.max_allocation_bytes, device.global_bytes);
-    if (bytes <= most) return;
-    // Bytes grow with the square of the resolution and with the slices.
-    const double over = static_cast<double>(bytes) / static_cast<double>(most);
-    const int resolution = static_cast<int>(settings.resolution / std::sqrt(over)), slices = static_cast<int>(settings.slices / over);
+    const std::uint64_t most = std::min(device.max_allocation_bytes, device.global_bytes), size = element_size(kind, settings);
+    if (elements * size <= most) return;
     throw Error(ErrorCode::too_large,
                 "technique.resolution: " + std::to_string(settings.slices) + " slices of " + std::to_string(settings.resolution) +
-                    " texels each way take " + std::to_string(bytes) + " bytes, the device allows " + std::to_string(most),
-                "a resolution of " + std::to_string(resolution) + " would fit, or " + std::to_string(std::max(slices, 1)) + " slices");
+                    " texels each way take " + std::to_string(elements * size) + " bytes, the device allows " + std::to_string(most),
+                what_fits(marked, most / size, kind, directional, settings));
 }
 
 void build_tables(opencl::Work& work, const opencl::Specialisation& program, const Marked& marked, const OcclusionTexture& settings,
@@ -227,7 +263,7 @@ PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Special
     set_levels(marked, kind, scenery.light.directional);
     const LevelLayout layout = layout_of(marked, kind);
     const std::uint64_t bytes = layout.elements * element_size(kind, settings);
-    check_memory(work.context(), bytes, settings);
+    check_memory(work.context(), marked, layout.elements, kind, scenery.light.directional, settings);
 
     work.stage("prefilter");
     PreparedOcclusionTexture::Part prepared{.light = {.centre_x = static_cast<float>(part.centre_x),
@@ -363,14 +399,20 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
     }
     if (scenery.range.near == scenery.range.far)
         prepared.warnings.push_back("all that casts lies in one plane parallel to the light: one slice holds it");
+    if (scenery.casters.left_out > 0)
+        prepared.warnings.push_back(std::to_string(scenery.casters.left_out) +
+                                    " triangles with vertices that are not finite were left out");
     if (scenery.range.cut > 0)
         prepared.warnings.push_back(std::to_string(scenery.range.cut) + " triangles reach nearer to the light's plane than " +
                                     std::to_string(scenery.range.near) + ": what is nearer casts nothing");
     const int splits = frame.half_u > 0 || frame.half_v > 0 ? settings.light_splits : 1;
+    float before = 0; // as the device adds the shares up; the last one makes them 1 to the bit
     for (const SlicePart& part : parts_of(frame, splits)) {
         std::string note;
-        prepared.parts.push_back(
-            part_of(work, prepared.program, scenery, part, 1.0F / static_cast<float>(splits * splits), settings, note));
+        const bool last = prepared.parts.size() + 1 == static_cast<std::size_t>(splits * splits);
+        const float share = last ? 1 - before : 1.0F / static_cast<float>(splits * splits);
+        before += share;
+        prepared.parts.push_back(part_of(work, prepared.program, scenery, part, share, settings, note));
         prepared.parts.back().light.first = prepared.parts.size() == 1;
         if (prepared.notes.empty()) prepared.notes.push_back(note);
     }

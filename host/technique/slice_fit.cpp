@@ -107,6 +107,7 @@ SliceCasters slice_casters(const LightFrame& light, std::span<const TriangleMesh
                 const float* const p = casters.vertices.data() + 3 * (first + v);
                 return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
             });
+            casters.left_out += !finite;
             if (finite)
                 for (const std::uint32_t v : triangle) casters.triangles.push_back(static_cast<std::int32_t>(first + v));
         }

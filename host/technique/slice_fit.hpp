@@ -18,9 +18,10 @@ namespace penumbra {
 struct SliceCasters {
     std::vector<float> vertices;         // x, y, z
     std::vector<std::int32_t> triangles; // three vertices each
+    std::uint64_t left_out = 0;          // triangles with vertices that are not finite
 };
 
-// Triangles with vertices that are not finite are left out.
+// Triangles with vertices that are not finite are left out, and counted.
 SliceCasters slice_casters(const LightFrame& light, std::span<const TriangleMesh* const> meshes);
 
 // The range of depth that the slices share. A directional light has its origin moved to `origin` along its direction, before all that

@@ -3,6 +3,7 @@
 #include "support/device_run.hpp"
 #include "support/maps.hpp"
 
+#include "technique/occlusion_texture_run.hpp"
 #include "technique/shadow_map.hpp"
 
 namespace penumbra::test {
@@ -79,6 +80,36 @@ TEST(Canary, ShadowMap)
             expect_visibility(work.read(visibility), "shadow_map");
             EXPECT_NO_THROW(work.finish());
         }
+}
+
+TEST(Canary, OcclusionTexture)
+{
+    const auto context = device_context(true);
+    const Light sun = DirectionalLight{.direction = {0, 0, -1}, .angular_diameter_deg = 5, .up = Vec3(0, 1, 0)};
+    for (const int resolution : {4, 7, 31, 64})
+        for (const Prefilter prefilter : {Prefilter::nbuffer, Prefilter::mipmap, Prefilter::summed_area})
+            for (const LevelStorage storage : {LevelStorage::binary32, LevelStorage::normalized16})
+                for (const Light& light : {Light(rectangle_light(1, 0.3)), sun})
+                    for (const Size size : {sizes[0], sizes[3], sizes[4]}) {
+                        // One slice and 64; triangles that reach over the whole window and beyond the light's plane; a solid of awkward
+                        // maps.
+                        SliceCase c{.light = light,
+                                    .casters = {triangles_in(30, {-2, -2, 3}, {2, 2, 6}, 1, 1), sheet(-3, 3, -3, 3, 5),
+                                                mesh_of({{-1, -1, -30}, {1, 0, 8}, {0, 1, 8}}, {{0, 1, 2}})},
+                                    .settings = {.slices = size.width == 1 ? 1 : 64,
+                                                 .resolution = resolution,
+                                                 .prefilter = prefilter,
+                                                 .storage = storage,
+                                                 .combine = size.width == 7 ? Combine::layered : Combine::product},
+                                    .receivers = random_map(size.width, size.height, 3, 9, 0.1, 3),
+                                    .camera = light_camera(light_frame(point_light()), {1, 1}, {0, 0, 0}),
+                                    .solid = std::pair{random_map(size.width, size.height, 1, 4, 0.3, 1),
+                                                       random_map(size.width, size.height, 2, 5, 0.3, 2)},
+                                    .solid_camera = light_camera(light_frame(light), {1, 1}, {0, 0, 0})};
+                        SliceRun r;
+                        ASSERT_NO_THROW(r = run(context, c)) << resolution << " texels, " << size.width << " x " << size.height;
+                        expect_visibility(r.visibility, "occlusion_texture, " + std::to_string(resolution));
+                    }
 }
 
 TEST(Canary, SampleMask)

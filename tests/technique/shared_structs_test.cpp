@@ -96,6 +96,54 @@ TEST(SharedStructs, WedgeLight)
     EXPECT_EQ(sizeof(WedgeLight), 11 * 4u + sizeof(WedgeLight::share) + 4 * 4u);
 }
 
+TEST(SharedStructs, SliceView)
+{
+    const std::vector<cl_int> host = {sizeof(SliceView),         HERE(SliceView, width),        HERE(SliceView, height),
+                                      HERE(SliceView, slices),   HERE(SliceView, orthographic), HERE(SliceView, behind),
+                                      HERE(SliceView, centre_x), HERE(SliceView, centre_y),     HERE(SliceView, low_x),
+                                      HERE(SliceView, low_y),    HERE(SliceView, per_x),        HERE(SliceView, per_y)};
+    EXPECT_EQ(on_device(writes("SliceView", {"width", "height", "slices", "orthographic", "behind", "centre_x", "centre_y", "low_x",
+                                             "low_y", "per_x", "per_y"}),
+                        host.size()),
+              host);
+    EXPECT_EQ(sizeof(SliceView), 11 * 4u); // every member is listed
+}
+
+TEST(SharedStructs, OcclusionPlane)
+{
+    const std::vector<cl_int> host = {sizeof(OcclusionPlane),          HERE(OcclusionPlane, slice),   HERE(OcclusionPlane, layer),
+                                      HERE(OcclusionPlane, levels),    HERE(OcclusionPlane, at_x),    HERE(OcclusionPlane, at_y),
+                                      HERE(OcclusionPlane, half_x),    HERE(OcclusionPlane, half_y),  HERE(OcclusionPlane, far),
+                                      HERE(OcclusionPlane, fade_from), HERE(OcclusionPlane, per_fade)};
+    EXPECT_EQ(on_device(writes("OcclusionPlane",
+                               {"slice", "layer", "levels", "at_x", "at_y", "half_x", "half_y", "far", "fade_from", "per_fade"}),
+                        host.size()),
+              host);
+    EXPECT_EQ(sizeof(OcclusionPlane), 10 * 4u); // every member is listed
+}
+
+TEST(SharedStructs, OcclusionLevel)
+{
+    const std::vector<cl_int> host = {sizeof(OcclusionLevel),       HERE(OcclusionLevel, width), HERE(OcclusionLevel, height),
+                                      HERE(OcclusionLevel, stride), HERE(OcclusionLevel, rows),  HERE(OcclusionLevel, scale),
+                                      HERE(OcclusionLevel, shift),  HERE(OcclusionLevel, offset)};
+    EXPECT_EQ(on_device(writes("OcclusionLevel", {"width", "height", "stride", "rows", "scale", "shift", "offset"}), host.size()), host);
+    EXPECT_EQ(sizeof(OcclusionLevel), 7 * 4u); // every member is listed
+}
+
+TEST(SharedStructs, OcclusionLight)
+{
+    const std::vector<cl_int> host = {sizeof(OcclusionLight),       HERE(OcclusionLight, centre_x),     HERE(OcclusionLight, centre_y),
+                                      HERE(OcclusionLight, zero_x), HERE(OcclusionLight, zero_y),       HERE(OcclusionLight, share),
+                                      HERE(OcclusionLight, first),  HERE(OcclusionLight, orthographic), HERE(OcclusionLight, planes),
+                                      HERE(OcclusionLight, taps_x), HERE(OcclusionLight, taps_y),       HERE(OcclusionLight, combine)};
+    EXPECT_EQ(on_device(writes("OcclusionLight", {"centre_x", "centre_y", "zero_x", "zero_y", "share", "first", "orthographic", "planes",
+                                                  "taps_x", "taps_y", "combine"}),
+                        host.size()),
+              host);
+    EXPECT_EQ(sizeof(OcclusionLight), 11 * 4u); // every member is listed
+}
+
 TEST(SharedStructs, Constants)
 {
     const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff, WEDGE_GROUP}; // the largest float

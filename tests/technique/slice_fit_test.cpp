@@ -17,6 +17,7 @@ TEST(SliceCastersOf, HoldLightSpaceAndNothingThatIsNotFinite)
     TriangleMesh mesh = mesh_of({{1, 2, 3}, {4, 5, 6}, {7, 8, 10}, {NAN, 0, 0}, {0, INFINITY, 0}}, {{0, 1, 2}, {0, 1, 3}, {4, 1, 2}});
     const SliceCasters casters = casters_of({sheet(0, 1, 0, 1, 2), mesh});
     EXPECT_EQ(casters.triangles, (std::vector<std::int32_t>{0, 1, 2, 0, 2, 3, 4, 5, 6}));
+    EXPECT_EQ(casters.left_out, 2u);
     EXPECT_EQ(casters.vertices[12], 1);
     EXPECT_EQ(casters.vertices[13], 2);
     EXPECT_EQ(casters.vertices[14], 3);

@@ -168,6 +168,9 @@ TEST(Specialisations, EveryRequestIsCompiledByTheBuild)
         expect_built(
             SoftShadowMapConstants{.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = static_cast<int>(accumulator)}
                 .specialisation());
+    for (int prefilter = 0; prefilter < 4; ++prefilter)
+        for (int storage = 0; storage < (prefilter == 2 ? 1 : 2); ++storage)
+            expect_built(OcclusionTextureConstants{.lanes = lanes, .prefilter = prefilter, .storage = storage}.specialisation());
 }
 
 } // namespace
