@@ -50,9 +50,11 @@ __attribute__((always_inline)) inline Outline outline_of(const SliceView view, _
         o.corner[i] = v;
     }
     const float2 corner = (float2)(view.low_x, view.low_y), per = (float2)(view.per_x, view.per_y), size = (float2)(view.width, view.height);
-    // Those whose middles lie within, and a 64th of a texel further each way: rounding, of some 2^-22 of at most 4096 texels, must not lose one.
-    const float2 first = clamp(ceil((low - corner) * per - 0.515625f), (float2)(0.0f), size);
-    const float2 last = clamp(floor((high - corner) * per + 0.515625f), (float2)(0.0f), size);
+    // Those whose middles lie within, and a little further each way: rounding must not lose one. It is some 2^-22 of at most 4096 texels, which a 64th of a texel holds, and of
+    // how far the window lies off the axis.
+    const float2 further = 0.515625f + 0x1p-21f * fabs(corner) * per;
+    const float2 first = clamp(ceil((low - corner) * per - further), (float2)(0.0f), size);
+    const float2 last = clamp(floor((high - corner) * per + further), (float2)(0.0f), size);
     o.low = whole ? (int2)(0) : convert_int2(first);
     o.high = whole ? (int2)(view.width, view.height) : convert_int2(last);
     return o;
