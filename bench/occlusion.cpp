@@ -189,13 +189,17 @@ void occlusion_casters(const Engine& engine)
 
 void occlusion_sheet(const Engine& engine)
 {
-    for (const double degrees : {0.0, 45.0}) {
-        const Scene scene = tilted_sheet(degrees);
-        const Image reference = reference_of(engine, scene, 4096);
-        for (const Combine combine : {Combine::product, Combine::sum, Combine::max, Combine::layered, Combine::layered_max})
-            for (const int slices : {4, 16, 64})
-                emit(engine, scene, OcclusionTexture{.slices = slices, .combine = combine}, reference, "occlusion_sheet", slices, 3);
-    }
+    const auto row = [&](const Scene& scene, const OcclusionTexture& settings, const Image& reference) {
+        emit(engine, scene, settings, reference, "occlusion_sheet", settings.slices, 3);
+    };
+    const Scene level = tilted_sheet(0), tilted = tilted_sheet(45);
+    const Image level_reference = reference_of(engine, level, 4096), tilted_reference = reference_of(engine, tilted, 4096);
+    for (const Prefilter prefilter : {Prefilter::nbuffer, Prefilter::mipmap, Prefilter::summed_area})
+        row(level, {.prefilter = prefilter}, level_reference);
+    for (const Combine combine : {Combine::product, Combine::sum, Combine::max, Combine::layered, Combine::layered_max})
+        for (const int slices : {4, 16, 64}) row(tilted, {.slices = slices, .combine = combine}, tilted_reference);
+    for (const Combine combine : {Combine::product, Combine::layered})
+        row(tilted, {.prefilter = Prefilter::summed_area, .combine = combine}, tilted_reference);
 }
 
 } // namespace penumbra::bench
