@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 
 #include "cases.hpp"
 #include "rows.hpp"
@@ -100,6 +101,33 @@ void filter_row(const Engine& engine, const Scene& scene, const OcclusionTexture
     std::fflush(stdout);
 }
 
+// Processor time of one shading, of all cores together: what others do on the machine hardly moves it. The least of five batches.
+double shade_cpu_ms(const Engine& engine, const Scene& scene, const OcclusionTexture& settings)
+{
+    constexpr int batch = 5;
+    const Scene ready = with_depth(scene, settings);
+    const Prepared prepared = engine.prepare(ready, settings);
+    double best = 1e30;
+    for (int run = 0; run < 5; ++run) {
+        const std::clock_t begun = std::clock();
+        for (int i = 0; i < batch; ++i) engine.shade(prepared, ready.receivers);
+        best = std::min(best, 1e3 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC / batch);
+    }
+    return best;
+}
+
+void cpu_header(const char* parameter)
+{
+    std::printf("# | %s | N-buffers: CPU ms a shading | summed-area tables |\n# | --- | --- | --- |\n", parameter);
+}
+
+void cpu_row(const Engine& engine, const Scene& scene, const char* parameter)
+{
+    std::printf("# | %s | %.1f | %.1f |\n", parameter, shade_cpu_ms(engine, scene, {}),
+                shade_cpu_ms(engine, scene, {.prefilter = Prefilter::summed_area}));
+    std::fflush(stdout);
+}
+
 } // namespace
 
 void occlusion(const Engine& engine)
@@ -145,6 +173,9 @@ void occlusion_filters(const Engine& engine)
 
 void occlusion_light(const Engine& engine)
 {
+    cpu_header("light's side");
+    for (const double side : {0.1, 0.2, 0.5, 1.0, 2.0})
+        cpu_row(engine, paper_scene(Occluder::bunny, {.light_side = side}), std::to_string(side).substr(0, 3).c_str());
     for (const double side : {0.1, 0.2, 0.5, 1.0, 2.0}) {
         const Scene scene = paper_scene(Occluder::bunny, {.light_side = side});
         const Image reference = reference_of(engine, scene, reference_samples);
@@ -167,6 +198,11 @@ void occlusion_light(const Engine& engine)
 
 void occlusion_casters(const Engine& engine)
 {
+    cpu_header("triangles");
+    for (const std::uint32_t rings : {22U, 45U, 89U, 179U, 358U}) {
+        const TriangleMesh mesh = bumpy_ball(rings);
+        cpu_row(engine, paper_scene("ball", mesh, {}), std::to_string(mesh.triangles.size()).c_str());
+    }
     // Triangles: 1.8, 7.9, 31, 127, 511 thousand.
     for (const std::uint32_t rings : {22U, 45U, 89U, 179U, 358U}) {
         const TriangleMesh mesh = bumpy_ball(rings);
