@@ -1,8 +1,8 @@
 // Smoothies (Chan, Durand: Rendering Fake Soft Shadows with Smoothies, 2003): a shadow map whose silhouettes wear fins, which fade from dark to light outwards.
 //
 // A smoothie's edge has alpha = dot(p - v, n) / t, a corner |v - p| / t (section 3.1): in both, the distance in the light's image from the nearest point of the
-// silhouette, over t. So the least over all edges of the distance from the edge, as a segment, is what the paper's quadrilaterals give, at corners of any number of
-// edges too.
+// silhouette, over t. So an edge here is what lies on its outer side, by the distance from it as a segment: the paper's rectangles, and corners of any number of edges.
+// At the ends it reaches half a turn around, further than a corner: of edges that slant in depth the nearer end's fin, which is wider, shows beyond its rectangle.
 //
 // Specialisation constants
 //   LANES      texels a work-item owns side by side
@@ -36,20 +36,21 @@ __kernel void receiver_depths(const ReceiverView receivers, const OccluderView o
 }
 
 // spread_receivers: a texel without receivers takes those of the texels around it, so that receivers seen by a camera with fewer pixels leave no holes.
+// `around`: the furthest is taken from around in any case, since a texel at an outline, in which a camera sees the blocker alone, is blended into the floor behind.
 //
 // Launched over the texels.
-__kernel void spread_receivers(const int2 size, __global const int* restrict nearest, __global const int* restrict furthest, __global int* restrict to_nearest,
+__kernel void spread_receivers(const int2 size, const int around, __global const int* restrict nearest, __global const int* restrict furthest, __global int* restrict to_nearest,
                                __global int* restrict to_furthest)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-    int near = nearest[y * size.x + x], far = furthest[y * size.x + x];
-    if (near == 0)
-        for (int j = max(y - 1, 0); j <= min(y + 1, size.y - 1); ++j)
-            for (int i = max(x - 1, 0); i <= min(x + 1, size.x - 1); ++i) {
-                near = max(near, nearest[j * size.x + i]);
-                far = min(far, furthest[j * size.x + i]);
-            }
+    const int own = nearest[y * size.x + x];
+    int near = own, far = furthest[y * size.x + x];
+    for (int j = max(y - 1, 0); (own == 0 || around) && j <= min(y + 1, size.y - 1); ++j)
+        for (int i = max(x - 1, 0); i <= min(x + 1, size.x - 1); ++i) {
+            if (own == 0) near = max(near, nearest[j * size.x + i]);
+            far = min(far, furthest[j * size.x + i]);
+        }
     to_nearest[y * size.x + x] = near;
     to_furthest[y * size.x + x] = far;
 }
@@ -118,44 +119,50 @@ inline void store_texels(__global float* to, const floatn values, const int left
     for (int lane = 0; lane < LANES && lane < left; ++lane) to[lane] = lanes[lane];
 }
 
-// smoothie_buffer: the least remapped alpha of each texel and the disparity of the smoothie it belongs to (minimum blending, 3.1); smoothies behind the map's
-// blocker, and behind the receiver, are dropped.
+// smoothie_buffer: of each texel the smoothie of the least remapped alpha (minimum blending, 3.1), as its distance and disparity: each receiver remaps it by itself,
+// since a texel at an outline holds receivers on the blocker and behind it. Smoothies behind the map's blocker, and behind the receiver, are dropped.
+//
+// Alphas are compared for the furthest receiver; where the map hides that, no fin matters to it, and for the nearest.
 //
 //   boxes, edge_boxes, edges     of groups, blocks of 16; of the edges of each group; [groups][16][8]
 //   texels                       the occluder map: disparity, covered share
 //   nearest, furthest            disparities of the nearest and the furthest receiver, as bits
-//   alphas, depths [height][width]             alpha 1, disparity 0 where there is no smoothie
+//   distances, depths [height][width]   from the silhouette; disparity 0 where there is no smoothie
 //   inner_distances, inner_depths   two_sided: distance from the silhouette on its inner side (negative: none), and its disparity
 //
 // Launched over work-items, (width / LANES) x (height / BUFFER_ROWS), both rounded up.
 __kernel void smoothie_buffer(const SmoothieView view, __global const float* restrict boxes, __global const float* restrict edge_boxes,
                               __global const float* restrict edges, __global const float2* restrict texels, __global const int* restrict nearest,
-                              __global const int* restrict furthest, __global float* restrict alphas, __global float* restrict depths,
+                              __global const int* restrict furthest, __global float* restrict distances, __global float* restrict depths,
                               __global float* restrict inner_distances, __global float* restrict inner_depths)
 {
     const int first_x = get_global_id(0) * LANES, first_y = get_global_id(1) * BUFFER_ROWS;
     if (first_x >= view.width || first_y >= view.height) return;
     const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
-    floatn alpha[BUFFER_ROWS], depth[BUFFER_ROWS], inner[BUFFER_ROWS], share[BUFFER_ROWS], inner_depth[BUFFER_ROWS], r[BUFFER_ROWS], behind[BUFFER_ROWS], map[BUFFER_ROWS];
+    floatn alpha[BUFFER_ROWS], distance[BUFFER_ROWS], depth[BUFFER_ROWS], slack[BUFFER_ROWS], inner[BUFFER_ROWS], share[BUFFER_ROWS], inner_depth[BUFFER_ROWS], r[BUFFER_ROWS], behind[BUFFER_ROWS], map[BUFFER_ROWS];
     floatn x, least = (floatn)(NO_RECEIVER);
     float columns[LANES];
     for (int lane = 0; lane < LANES; ++lane) columns[lane] = view.left + (first_x + lane) * view.step_x;
     x = load_lanes(columns);
     for (int row = 0; row < BUFFER_ROWS; ++row) {
-        float rs[LANES], fs[LANES], maps[LANES];
+        float rs[LANES], fs[LANES], maps[LANES], slacks[LANES];
         for (int lane = 0; lane < LANES; ++lane) {
             const int at = min(first_y + row, view.height - 1) * view.width + min(first_x + lane, view.width - 1);
-            rs[lane] = as_float(nearest[at]);
             // Where no receiver is anywhere near nobody looks.
             fs[lane] = nearest[at] == 0 ? 0.0f : as_float(furthest[at]);
             maps[lane] = texels[at].x;
+            const bool covered = maps[lane] > fs[lane] * (1.0f + 0x1p-10f);
+            rs[lane] = covered ? as_float(nearest[at]) : fs[lane];
+            // A texel that the map leaves bare is outside, though edges rounded, or rendered elsewhere, may miss it by up to a texel.
+            slacks[lane] = covered ? 0.0f : fmax(view.step_x, view.step_y);
         }
+        slack[row] = load_lanes(slacks);
         r[row] = load_lanes(rs);
         behind[row] = load_lanes(fs);
         map[row] = load_lanes(maps);
         least = select_lanes(least, behind[row], behind[row] < least);
         alpha[row] = one;
-        depth[row] = inner_depth[row] = zero;
+        distance[row] = depth[row] = inner_depth[row] = zero;
         inner[row] = -one;
         share[row] = one;
     }
@@ -176,14 +183,16 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
                     const floatn y = (floatn)(view.top - (first_y + row) * view.step_y);
                     const Nearest n = nearest_of(edge, x, y);
                     const floatn width = width_of(view, n.b, r[row]);
-                    const intn kept = (n.distance < alpha[row] * width) & (n.b >= map[row]);
+                    const float dx = edge[2] - edge[0], dy = edge[3] - edge[1];
+                    const floatn out = (x - edge[0]) * dy - (y - edge[1]) * dx;
+                    const intn kept = (n.distance < alpha[row] * width) & (n.b >= map[row]) & ((out >= zero) | (n.distance < slack[row]));
                     alpha[row] = select_lanes(alpha[row], n.distance / width, kept);
+                    distance[row] = select_lanes(distance[row], n.distance, kept);
                     depth[row] = select_lanes(depth[row], n.b, kept);
                     if (!view.two_sided) continue;
                     // On the blocker's side, where light gets past the silhouette to the furthest receiver: what the map shows beyond does not hide it.
-                    const float dx = edge[2] - edge[0], dy = edge[3] - edge[1];
                     const floatn full = width_of(view, n.b, behind[row]);
-                    intn within = (map[row] > zero) & ((x - n.x) * dy - (y - n.y) * dx <= zero) & (n.distance < share[row] * full);
+                    intn within = (map[row] > zero) & (out <= zero) & (n.distance < share[row] * full);
                     if (NONE(within)) continue;
                     within &= beyond(view, edge, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
                     share[row] = select_lanes(share[row], n.distance / full, within);
@@ -195,7 +204,7 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
     }
     for (int row = 0; row < BUFFER_ROWS && first_y + row < view.height; ++row) {
         const int at = (first_y + row) * view.width + first_x, left = view.width - first_x;
-        store_texels(alphas + at, alpha[row], left);
+        store_texels(distances + at, distance[row], left);
         store_texels(depths + at, depth[row], left);
         if (!view.two_sided) continue;
         store_texels(inner_distances + at, inner[row], left);
@@ -215,7 +224,7 @@ inline float width_at(const SmoothieView view, const float b, const float r)
 //
 // Launched over the receivers.
 __kernel void smoothie_composite(const ReceiverView receivers, const OccluderView occluders, const SmoothieView view, const float bias, const float precision,
-                                 __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict alphas,
+                                 __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict distances,
                                  __global const float* restrict depths, __global const float* restrict inner_distances,
                                  __global const float* restrict inner_depths, __global const float* restrict xi,
                                  __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
@@ -242,7 +251,8 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
                         if (view.two_sided && inner_distances[texel] >= 0.0f && inner_depths[texel] > limit)
                             v = fmax(0.5f - 0.5f * inner_distances[texel] / width_at(view, inner_depths[texel], d[at]), 0.0f);
                     } else if (depths[texel] > d[at] + rounding) {
-                        v = view.two_sided ? 0.5f + 0.5f * alphas[texel] : alphas[texel];
+                        v = fmin(distances[texel] / width_at(view, depths[texel], d[at]), 1.0f);
+                        if (view.two_sided) v = 0.5f + 0.5f * v;
                     }
                 }
                 seen += v * (i ? part.x : 1.0f - part.x) * (j ? part.y : 1.0f - part.y);

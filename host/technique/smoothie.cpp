@@ -96,7 +96,7 @@ struct ReceiverDepths {
     opencl::Buffer<cl_int> nearest, furthest;
 };
 
-// The nearest and the furthest receiver of every texel, spread into the texels where none is seen.
+// The nearest and the furthest receiver of every texel, spread into the texels where none is seen; the furthest of the texels around too.
 ReceiverDepths receiver_depths(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers)
 {
     const std::size_t width = static_cast<std::size_t>(prepared.view.width), height = static_cast<std::size_t>(prepared.view.height);
@@ -113,7 +113,8 @@ ReceiverDepths receiver_depths(opencl::Work& work, const PreparedSmoothie& prepa
                 depths.furthest);
     for (int i = 0; i < spreads; ++i) {
         work.launch(prepared.program, "spread_receivers", {width, height}, {16, 8}, count * 16,
-                    cl_int2{{prepared.view.width, prepared.view.height}}, depths.nearest, depths.furthest, other.nearest, other.furthest);
+                    cl_int2{{prepared.view.width, prepared.view.height}}, cl_int{i == 0}, depths.nearest, depths.furthest, other.nearest,
+                    other.furthest);
         std::swap(depths, other);
     }
     return depths;
@@ -209,19 +210,19 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     const SmoothieView& view = prepared.view;
     const std::size_t width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height), count = width * height;
     const ReceiverDepths depths_of = receiver_depths(work, prepared, receivers);
-    const auto alphas = work.buffer<float>(count, "smoothie alpha"), depths = work.buffer<float>(count, "smoothie disparity");
+    const auto fin_distances = work.buffer<float>(count, "smoothie distance"), depths = work.buffer<float>(count, "smoothie disparity");
     const std::size_t inner = view.two_sided ? count : 1;
     const auto distances = work.buffer<float>(inner, "inner distance"), inner_depths = work.buffer<float>(inner, "inner disparity");
     const std::size_t lanes = static_cast<std::size_t>(work.context().quirks().lanes);
     work.launch(prepared.program, "smoothie_buffer", {(width + lanes - 1) / lanes, (height + 7) / 8},
                 {lanes == 1 ? std::size_t{16} : std::size_t{1}, 1}, count * 24 + prepared.edges.bytes(), view, prepared.boxes,
-                prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, alphas, depths, distances,
-                inner_depths);
+                prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, fin_distances, depths,
+                distances, inner_depths);
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(receivers.view.width), static_cast<std::size_t>(receivers.view.height)};
     work.launch(prepared.program, "smoothie_composite", grid, {16, 8}, grid[0] * grid[1] * 16, receivers.view, prepared.occluders, view,
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),
-                prepared.map.texels, prepared.map.steps, alphas, depths, distances, inner_depths, receivers.xi, receivers.eta, receivers.d,
-                visibility);
+                prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
+                receivers.d, visibility);
 }
 
 } // namespace penumbra
