@@ -144,10 +144,26 @@ TEST(SharedStructs, OcclusionLight)
     EXPECT_EQ(sizeof(OcclusionLight), 11 * 4u); // every member is listed
 }
 
+TEST(SharedStructs, SmoothieView)
+{
+    const std::vector<std::string> members = {"width",       "height", "left",         "top",    "step_x",    "step_y",
+                                              "fixed_width", "light",  "orthographic", "groups", "two_sided", "sinusoidal"};
+    const std::vector<cl_int> host = {
+        sizeof(SmoothieView),          HERE(SmoothieView, width),        HERE(SmoothieView, height), HERE(SmoothieView, left),
+        HERE(SmoothieView, top),       HERE(SmoothieView, step_x),       HERE(SmoothieView, step_y), HERE(SmoothieView, fixed_width),
+        HERE(SmoothieView, light),     HERE(SmoothieView, orthographic), HERE(SmoothieView, groups), HERE(SmoothieView, two_sided),
+        HERE(SmoothieView, sinusoidal)};
+    EXPECT_EQ(on_device(writes("SmoothieView", members), host.size()), host);
+    EXPECT_EQ(sizeof(SmoothieView), 12 * 4u);
+}
+
 TEST(SharedStructs, Constants)
 {
-    const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff, WEDGE_GROUP}; // the largest float
-    EXPECT_EQ(on_device("    out[0] = TILE_WIDTH; out[1] = BLOCK; out[2] = as_int(NO_RECEIVER); out[3] = WEDGE_GROUP;\n", 4), host);
+    const std::vector<cl_int> host = {TILE_WIDTH, BLOCK, 0x7f7fffff, WEDGE_GROUP, SMOOTHIE_GROUP}; // the largest float
+    EXPECT_EQ(
+        on_device("    out[0] = TILE_WIDTH; out[1] = BLOCK; out[2] = as_int(NO_RECEIVER); out[3] = WEDGE_GROUP; out[4] = SMOOTHIE_GROUP;\n",
+                  5),
+        host);
     EXPECT_EQ(NO_RECEIVER, std::numeric_limits<float>::max());
 }
 
