@@ -36,6 +36,8 @@ constexpr Case cases[] = {
     {"occlusion_light", occlusion_light, "occlusion_texture: error and time over the light's size; the sun"},
     {"occlusion_casters", occlusion_casters, "occlusion_texture: time over triangles and bunnies (Figs. 12, 13)"},
     {"occlusion_sheet", occlusion_sheet, "occlusion_texture: a tilted sheet in 4 to 64 slices"},
+    {"smoothies", smoothies, "smoothie: Table 1 of its paper, beside shadow maps; its width t"},
+    {"smoothie_light_size", smoothie_light_size, "smoothie: error over the light's size, beside soft_shadow_map (Fig. 8)"},
     {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},
 };
@@ -43,7 +45,7 @@ constexpr Case cases[] = {
 int usage()
 {
     std::fputs("usage: penumbra_bench BENCH...\n", stderr);
-    for (const Case& c : cases) std::fprintf(stderr, "  %-17s %s\n", c.name, c.meaning);
+    for (const Case& c : cases) std::fprintf(stderr, "  %-20s %s\n", c.name, c.meaning);
     return 2;
 }
 
