@@ -160,12 +160,12 @@ inline __attribute__((always_inline)) __global element* level_of(__global elemen
 
 // first_level: the textures themselves, with the padding around.
 //
-// Launched over stored columns x (stored rows x textures); a work-item makes COLUMNS of them, the others between do nothing.
+// Launched over (stored columns / COLUMNS) x (stored rows x textures).
 __kernel void first_level(const int2 size, const int textures, const int last, const int leak_fix, const OcclusionLevel level,
                           __global const OcclusionPlane* restrict planes, __global const uint* restrict occupancy, __global element* restrict data)
 {
-    const int x = get_global_id(0), row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
-    if (x % COLUMNS != 0 || x >= level.stride || texture >= textures) return;
+    const int x = get_global_id(0) * COLUMNS, row = get_global_id(1), texture = row / level.rows, y = row - texture * level.rows;
+    if (x >= level.stride || texture >= textures) return;
     const int inside_x = x - (level.width - size.x) / 2, inside_y = y - (level.height - size.y) / 2;
     __global element* to = level_of(data, level, texture) + y * level.stride + x;
     for (int i = 0; i < COLUMNS; ++i) to[i] = 0;
@@ -240,13 +240,30 @@ __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level,
     *(__global element16*)(level_of(data, level, texture) + y * level.stride + x) = ELEMENT16(values);
 }
 
+#if PREFILTER == 3
+
+// Of a disc wider than that of the highest level: that level seen from as much nearer to the window's middle, thinned by both widths. Level l stands for a disc
+// 4 sqrt((4^l - 1) / 3) across (mean_of_levels).
+inline __attribute__((always_inline)) floatn widest(const int count) { return (floatn)(4.0f * sqrt((exp2(2.0f * (count - 1)) - 1.0f) * (1.0f / 3))); }
+inline __attribute__((always_inline)) floatn moved(const floatn at, const int size, const floatn wide, const floatn highest)
+{
+    const floatn middle = (floatn)(0.5f * size), nearer = select_lanes((floatn)(1.0f), highest / wide, wide > highest);
+    return fma(at - middle, nearer, middle);
+}
+
+#else
+
 // Of a kernel larger than the highest level's, which holds the whole window: the part of that level that lies inside the kernel, by moving it so that their nearer
 // borders meet; then it is thinned by their sizes.
-inline __attribute__((always_inline)) floatn moved(const floatn at, const int size, const floatn over)
+inline __attribute__((always_inline)) floatn widest(const int count) { return (floatn)((float)(1 << (count - 1))); }
+inline __attribute__((always_inline)) floatn moved(const floatn at, const int size, const floatn wide, const floatn highest)
 {
-    const floatn middle = (floatn)(0.5f * size), away = at - middle, zero = (floatn)(0.0f), rest = fabs(away) - over;
+    const floatn zero = (floatn)(0.0f), over = select_lanes(zero, 0.5f * (wide - highest), wide > highest);
+    const floatn middle = (floatn)(0.5f * size), away = at - middle, rest = fabs(away) - over;
     return middle + copysign(select_lanes(zero, rest, rest > zero), away);
 }
+
+#endif
 
 // log2 of 1 or more: 2 / ln 2 atanh(s), s = (m - 1) / (m + 1), with m from sqrt(1/2) to sqrt(2), so that |s| <= 0.1716. The first term left out, 2 / ln 2 s^9 / 9, is
 // below 2^-24. (PoCL's own log2 of a vector takes its lanes one by one.)
@@ -317,8 +334,7 @@ inline __attribute__((always_inline)) floatn mean_of_levels(__global const Occlu
                                                             const int texture, const floatn at_x, const floatn at_y, const floatn size)
 {
     const floatn one = (floatn)(1.0f), zero = (floatn)(0.0f), most = (floatn)(count - 1);
-    const floatn highest = (floatn)((float)(1 << (count - 1))), excess = select_lanes(zero, 0.5f * (size - highest), size > highest);
-    const floatn x = moved(at_x, window.x, excess), y = moved(at_y, window.y, excess);
+    const floatn highest = widest(count), x = moved(at_x, window.x, size, highest), y = moved(at_y, window.y, size, highest);
     const floatn thinner = select_lanes(one, highest / size, size > highest);
 #if PREFILTER == 3
     // A square of `size` stands for a disc of that diameter, whose variance is size^2 / 16 along each axis; level l has (4^l - 1) / 3.

@@ -242,7 +242,8 @@ void build_levels(opencl::Work& work, const opencl::Specialisation& program, con
         return static_cast<std::size_t>(layout.levels[level].rows) * static_cast<std::size_t>(layout.textures[level]);
     };
     const auto bytes = [&](std::size_t level) { return grid(level) * static_cast<std::size_t>(layout.levels[level].stride) * size; };
-    work.launch(program, "first_level", {static_cast<std::size_t>(layout.levels[0].stride), grid(0)}, {16, 1}, bytes(0),
+    const std::size_t columns = work.context().quirks().lanes == 1 ? 1 : 16; // COLUMNS of occlusion_levels.cl
+    work.launch(program, "first_level", {static_cast<std::size_t>(layout.levels[0].stride) / columns, grid(0)}, {1, 16}, bytes(0),
                 size_of(marked.view), layout.textures[0], static_cast<cl_int>(settings.layers - 1), static_cast<cl_int>(settings.leak_fix),
                 layout.levels[0], planes, marked.occupancy, data);
     for (std::size_t level = 1; level < layout.levels.size(); ++level) {
