@@ -63,6 +63,20 @@ TEST_F(MaskCommand, AnotherTechniqueDropsTheScenesSettings)
     EXPECT_EQ(nlohmann::json::parse(text_of(path("r.json"))).at("settings").at("sides"), "front");
 }
 
+TEST_F(MaskCommand, EveryTechniqueMakesAShadowOfTheScene)
+{
+    const std::string scene = write_scene("scene.json");
+    for (const std::string kind : {"shadow_map", "soft_shadow_map", "soft_shadow_volume", "occlusion_texture", "smoothie", "ray_traced"}) {
+        const Ran ran = penumbra({"mask", scene, "-o", path(kind + ".exr"), "--technique", kind, "--report", path("r.json")});
+        ASSERT_EQ(ran.code, 0) << ran.err;
+        EXPECT_EQ(nlohmann::json::parse(text_of(path("r.json"))).at("technique"), kind);
+        const Image mask = read_image(path(kind + ".exr"));
+        const auto [darkest, brightest] = std::ranges::minmax(mask.pixels);
+        EXPECT_EQ(brightest, 1.0f) << kind;
+        EXPECT_LT(darkest, 0.5f) << kind;
+    }
+}
+
 TEST_F(MaskCommand, FormatByExtensionBitsByTheScene)
 {
     const std::string technique = R"({"kind": "soft_shadow_map"})";

@@ -114,6 +114,11 @@ TEST(Refusals, OfWorkThatIsTooMuch)
     nlohmann::json split = scene_json();
     split["technique"] = {{"kind", "soft_shadow_volume"}, {"light_splits", 4}};
     expect_problem(ask(few.port, post(form(parts(split)))), 413, "technique.light_splits", "pairs");
+    // 64 slices of each of 256 parts: 2^14 textures, 2^24 pairs with 32 x 32 receivers, 2^30 texels at 256 x 256.
+    nlohmann::json slices = scene_json();
+    slices["technique"] = {{"kind", "occlusion_texture"}, {"slices", 64}, {"light_splits", 16}};
+    expect_problem(ask(few.port, post(form(parts(slices)))), 413, "technique.slices", "pairs");
+    expect_problem(ask(shared_port(), post(form(parts(slices)))), 413, "technique.resolution", "texels of slices");
     nlohmann::json rays = scene_json();
     rays["technique"] = {{"kind", "ray_traced"}, {"samples", 65536}};
     Running dim{server::Options{.device = {}, .token = {}, .rays = side * side}};
