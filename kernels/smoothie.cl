@@ -93,21 +93,19 @@ inline int16 reach(const SmoothieView view, __global const float* boxes, const f
     return (vload16(1, boxes) + width >= x0) & (vload16(0, boxes) - width <= x1) & (vload16(3, boxes) + width >= y0) & (vload16(2, boxes) - width <= y1) & (near > 0.0f);
 }
 
-// The furthest that the map shows just outside an edge's nearest point, within six texels along its outward normal: edges of a mesh zigzag about the outline that
-// the map shows by about the length of one. 0 where nothing is.
-inline floatn beyond(const SmoothieView view, __global const float* edge, const Nearest n, __global const float2* texels)
+// The furthest that the map shows within a texel of an edge's nearest point. The outline that the map shows is made of silhouette edges, which have the bare map
+// right beside them, in whatever direction they zigzag along it; others lie inside it. 0 where nothing is.
+inline floatn beside(const SmoothieView view, const Nearest n, __global const float2* texels)
 {
-    const float dx = edge[2] - edge[0], dy = edge[3] - edge[1], per = sqrt(edge[6]) * 1.5f;
     float x[LANES], y[LANES], found[LANES];
     store_lanes((n.x - view.left) / view.step_x, x);
     store_lanes((view.top - n.y) / view.step_y, y);
     for (int lane = 0; lane < LANES; ++lane) {
         found[lane] = NO_RECEIVER;
-        for (int step = 1; step <= 4; ++step) {
-            const int i = (int)rint(clamp(x[lane] + step * dy * per, -1.0f, (float)view.width));
-            const int j = (int)rint(clamp(y[lane] + step * dx * per, -1.0f, (float)view.height));
-            found[lane] = fmin(found[lane], i >= 0 && j >= 0 && i < view.width && j < view.height ? texels[j * view.width + i].x : 0.0f);
-        }
+        const int column = (int)rint(clamp(x[lane], -2.0f, view.width + 1.0f)), row = (int)rint(clamp(y[lane], -2.0f, view.height + 1.0f));
+        for (int j = row - 1; j <= row + 1; ++j)
+            for (int i = column - 1; i <= column + 1; ++i)
+                found[lane] = fmin(found[lane], i >= 0 && j >= 0 && i < view.width && j < view.height ? texels[j * view.width + i].x : 0.0f);
     }
     return load_lanes(found);
 }
@@ -190,11 +188,11 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
                     distance[row] = select_lanes(distance[row], n.distance, kept);
                     depth[row] = select_lanes(depth[row], n.b, kept);
                     if (!view.two_sided) continue;
-                    // On the blocker's side, where light gets past the silhouette to the furthest receiver: what the map shows beyond does not hide it.
+                    // Under a blocker, where light gets past the silhouette to the furthest receiver: what the map shows beside it does not hide that.
                     const floatn full = width_of(view, n.b, behind[row]);
-                    intn within = (map[row] > zero) & (out <= zero) & (n.distance < share[row] * full);
+                    intn within = (map[row] > behind[row] * (1.0f + 0x1p-10f)) & (n.distance < share[row] * full);
                     if (NONE(within)) continue;
-                    within &= beyond(view, edge, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
+                    within &= beside(view, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
                     share[row] = select_lanes(share[row], n.distance / full, within);
                     inner[row] = select_lanes(inner[row], n.distance, within);
                     inner_depth[row] = select_lanes(inner_depth[row], n.b, within);
