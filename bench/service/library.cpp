@@ -48,7 +48,10 @@ void write_request(const Folder& folder, const Scene& scene, const std::string& 
         return text_of(kind == "exr" ? encode_depth(map) : encode_image({map.width, map.height, 1, map.depth}, {"pfm", 32}));
     };
     const std::string front = "front." + kind, floor = "floor." + kind;
-    const std::string json = write_scene(scene, {.front = front, .back = {}, .receiver = floor, .layers = {}, .emission = {}});
+    DepthNames names;
+    names.front = front;
+    names.receiver = floor;
+    const std::string json = write_scene(scene, names);
     const std::string front_bytes = encoded(*scene.occluders.front), floor_bytes = encoded(*scene.receivers.depth);
     write(folder / (name + ".json"), json);
     write(folder / front, front_bytes);
