@@ -303,6 +303,24 @@ TEST(Smoothie, FinsBehindBlockersAreDropped)
     EXPECT_NE(mask({below}).pixels, mask({roof}).pixels);
 }
 
+// An edge inside the outline lets no light in: beside it the blocker below goes on, here for four texels.
+TEST(Smoothie, TwoSidedComesFromTheOutlineAlone)
+{
+    const TriangleMesh wide = sheet(-1, 1, -1, 1, 4), above = sheet(-0.73125, 0.73125, -0.73125, 0.73125, 3.9);
+    const auto mask = [&](const std::vector<TriangleMesh>& casters) {
+        return mask_of(smoothie_scene(sphere_light(0.5), casters, floor_at(8, size)), Smoothie{.two_sided = true});
+    };
+    const Image both = mask({wide, above}), alone = mask({wide});
+    int half_lit = 0;
+    for (int y = 48; y < 80; ++y) // the wide one's texels: tangents of 1/4 and less
+        for (int x = 48; x < 80; ++x) {
+            ASSERT_EQ(both.at(x, y), alone.at(x, y)) << x << ", " << y;
+            half_lit += alone.at(x, y) > 0;
+        }
+    EXPECT_GT(half_lit, 300);
+    EXPECT_LT(half_lit, 32 * 32);
+}
+
 // A receiver between a fin's own blocker and the light is lit whatever the least alpha of its texel.
 TEST(Smoothie, AFinShadesOnlyWhatLiesBehindIt)
 {
