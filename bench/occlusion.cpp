@@ -13,16 +13,6 @@ namespace {
 
 constexpr int reference_samples = 1024;
 
-void emit(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, const char* bench, double parameter,
-          int runs)
-{
-    Row row = measure(engine, scene, technique, reference, runs);
-    row.bench = bench;
-    row.scene = scene.objects.front().name;
-    row.parameter = parameter;
-    print(row);
-}
-
 RayTraced rays(int samples, bool adaptive) { return {.samples = samples, .adaptive = adaptive, .first_samples = 16, .seed = 1}; }
 
 // How uneven a mask is: the mean absolute second difference along rows and columns.

@@ -80,6 +80,16 @@ Row measure(const Engine& engine, const Scene& scene, const Technique& technique
     return row;
 }
 
+void emit(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, const char* bench, double parameter,
+          int runs)
+{
+    Row row = measure(engine, scene, technique, reference, runs);
+    row.bench = bench;
+    row.scene = scene.objects.front().name;
+    row.parameter = parameter;
+    print(row);
+}
+
 Image reference_of(const Engine& engine, const Scene& scene, int samples)
 {
     return engine.mask(scene, RayTraced{.samples = samples, .adaptive = false, .first_samples = 16, .seed = 4711}).visibility;

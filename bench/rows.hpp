@@ -32,6 +32,10 @@ void print(const Row& row);
 // The mask of `technique`, prepared once and shaded `runs` times after a warm-up; errors are against `reference`.
 Row measure(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, int runs);
 
+// Measures and prints a row of `bench`, named after the scene's first object.
+void emit(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, const char* bench, double parameter,
+          int runs);
+
 // Ray-traced visibility of the scene.
 Image reference_of(const Engine& engine, const Scene& scene, int samples);
 

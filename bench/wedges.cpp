@@ -7,16 +7,6 @@
 namespace penumbra::bench {
 namespace {
 
-void emit(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, const char* bench, double parameter,
-          int runs)
-{
-    Row row = measure(engine, scene, technique, reference, runs);
-    row.bench = bench;
-    row.scene = scene.objects.front().name;
-    row.parameter = parameter;
-    print(row);
-}
-
 void rays(const Engine& engine, const Scene& scene, const Image& reference, const char* bench)
 {
     for (const bool adaptive : {false, true})

@@ -57,11 +57,8 @@ __kernel void spread_receivers(const int2 size, const int around, __global const
 
 // How wide the penumbra outside a silhouette at disparity b is on a receiver at r: t (1 - b / r) of depths (Eq. 1), or from the light's size, half of
 // what it casts: h (1 / z_b - 1 / z_r). Not positive where the receiver is no further than the silhouette.
-inline floatn width_of(const SmoothieView view, const floatn b, const floatn r)
-{
-    if (view.fixed_width > 0.0f) return view.fixed_width * (1.0f - r / b);
-    return view.light * (view.orthographic ? 1.0f / r - 1.0f / b : b - r);
-}
+#define WIDTH_OF(view, b, r) \
+    ((view).fixed_width > 0.0f ? (view).fixed_width * (1.0f - (r) / (b)) : (view).light * ((view).orthographic ? 1.0f / (r) - 1.0f / (b) : (b) - (r)))
 
 // The nearest point of an edge to each of LANES texels.
 typedef struct {
@@ -180,7 +177,7 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
                 for (int row = 0; row < BUFFER_ROWS; ++row) {
                     const floatn y = (floatn)(view.top - (first_y + row) * view.step_y);
                     const Nearest n = nearest_of(edge, x, y);
-                    const floatn width = width_of(view, n.b, r[row]);
+                    const floatn width = WIDTH_OF(view, n.b, r[row]);
                     const float dx = edge[2] - edge[0], dy = edge[3] - edge[1];
                     const floatn out = (x - edge[0]) * dy - (y - edge[1]) * dx;
                     const intn kept = (n.distance < alpha[row] * width) & (n.b >= map[row]) & ((out >= zero) | (n.distance < slack[row]));
@@ -189,7 +186,7 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
                     depth[row] = select_lanes(depth[row], n.b, kept);
                     if (!view.two_sided) continue;
                     // Under a blocker, where light gets past the silhouette to the furthest receiver: what the map shows beside it does not hide that.
-                    const floatn full = width_of(view, n.b, behind[row]);
+                    const floatn full = WIDTH_OF(view, n.b, behind[row]);
                     intn within = (map[row] > behind[row] * (1.0f + 0x1p-10f)) & (n.distance < share[row] * full);
                     if (NONE(within)) continue;
                     within &= beside(view, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
@@ -208,12 +205,6 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
         store_texels(inner_distances + at, inner[row], left);
         store_texels(inner_depths + at, inner_depth[row], left);
     }
-}
-
-inline float width_at(const SmoothieView view, const float b, const float r)
-{
-    if (view.fixed_width > 0.0f) return view.fixed_width * (1.0f - r / b);
-    return view.light * (view.orthographic ? 1.0f / r - 1.0f / b : b - r);
 }
 
 // smoothie_composite: the three cases of Fig. 3 at the four nearest texels, blended (section 3, step 5), then the fall-off.
@@ -247,9 +238,9 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
                     if (hidden) {
                         v = 0.0f;
                         if (view.two_sided && inner_distances[texel] >= 0.0f && inner_depths[texel] > limit)
-                            v = fmax(0.5f - 0.5f * inner_distances[texel] / width_at(view, inner_depths[texel], d[at]), 0.0f);
+                            v = fmax(0.5f - 0.5f * inner_distances[texel] / WIDTH_OF(view, inner_depths[texel], d[at]), 0.0f);
                     } else if (depths[texel] > d[at] + rounding) {
-                        v = fmin(distances[texel] / width_at(view, depths[texel], d[at]), 1.0f);
+                        v = fmin(distances[texel] / WIDTH_OF(view, depths[texel], d[at]), 1.0f);
                         if (view.two_sided) v = 0.5f + 0.5f * v;
                     }
                 }
