@@ -23,33 +23,25 @@ done
 lines=$("$list") || { echo "compile_kernels: $list failed" >&2; exit 1; }
 [ -n "$lines" ] || { echo "compile_kernels: $list printed no specialisation" >&2; exit 1; }
 
-# One line, all targets. The options are split at blanks; a value that holds one cannot be written in a specialisation either.
-compile() {
+# One line, all targets. The options are split at blanks; a value that holds one cannot be written in a specialisation either. -Wundef: a
+# choice that common/choices.h does not name would count as 0.
+compile='
     file=$1
     shift
     if [ ! -f "$kernels/$file" ]; then
         echo "compile_kernels: no kernel file $file below $kernels" >&2
-        return 1
+        exit 1
     fi
     for target in host $targets; do
         if [ "$target" = host ]; then machine=; else machine="-target $target -nogpulib"; fi
-        # shellcheck disable=SC2086
-        if ! "$clang" -x cl -cl-std=CL1.2 $machine -Xclang -finclude-default-header -Wall -Wextra -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
+        if ! "$clang" -x cl -cl-std=CL1.2 $machine -Xclang -finclude-default-header -Wall -Wextra -Wundef -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
             echo "compile_kernels: failed for $target: $file $*" >&2
-            return 1
+            exit 1
         fi
     done
-}
+'
+export clang kernels targets
 
-failures=0
-count=0
-while IFS= read -r line; do
-    [ -n "$line" ] || continue
-    count=$((count + 1))
-    # shellcheck disable=SC2086
-    compile $line || failures=$((failures + 1))
-done <<END
-$lines
-END
-
-[ "$failures" -eq 0 ] || { echo "compile_kernels: $failures of $count specialisations failed" >&2; exit 1; }
+# As many at a time as there are processors; all are tried, and one that fails makes xargs fail.
+echo "$lines" | sed "s, *\$,," | xargs -P "$(getconf _NPROCESSORS_ONLN)" -L 1 sh -c "$compile" compile_kernels ||
+    { echo "compile_kernels: some of $(echo "$lines" | wc -l) specialisations failed" >&2; exit 1; }

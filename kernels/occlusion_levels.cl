@@ -3,22 +3,23 @@
 //   PREFILTER, STORAGE   as in occlusion_texture.cl
 #ifndef PENUMBRA_OCCLUSION_LEVELS
 #define PENUMBRA_OCCLUSION_LEVELS
+#include "common/choices.h"
 #include "common/shared.h"
 #include "common/lanes.clh"
 
 #ifndef PREFILTER
-#define PREFILTER 0
+#define PREFILTER PREFILTER_NBUFFER
 #endif
 #ifndef STORAGE
-#define STORAGE 0
+#define STORAGE STORAGE_BINARY32
 #endif
 
 #define MOST_LAYERS 8
 #define LEVEL_BLOCK 1024
 
-#if PREFILTER == 2
+#if PREFILTER == PREFILTER_TABLE
 typedef uint element;
-#elif STORAGE == 1
+#elif STORAGE == STORAGE_NORMALIZED16
 // 65535 is all of a texel. Sums of a few are whole numbers; a quarter goes to the nearest, halves to the even one.
 typedef ushort element;
 typedef uint stored;
@@ -78,7 +79,7 @@ __kernel void count_filled(const int2 size, const int textures, const int last, 
     if (count > 0) atomic_add((volatile __global int*)counts + texture, count);
 }
 
-#if PREFILTER == 2
+#if PREFILTER == PREFILTER_TABLE
 
 // table_rows, table_columns: summed-area tables (Crow 1984) of integers, so that they are exact. table [textures][height + 1][width + 1]: how many filled texels lie
 // below and to the left.
@@ -197,11 +198,11 @@ inline __attribute__((always_inline)) stored16 next_row(__global const element* 
                                                         const int x, const int y)
 {
     const int dx = (below.width - level.width) / 2, dy = (below.height - level.height) / 2;
-#if PREFILTER == 0
+#if PREFILTER == PREFILTER_NBUFFER
     const int before = apart > 0 ? apart : 1, left = x + dx - before, right = x + dx + apart, low = y + dy - before, high = y + dy + apart;
     return QUARTER((stored_row(from, below, left, low) + stored_row(from, below, right, low)) +
                    (stored_row(from, below, left, high) + stored_row(from, below, right, high)));
-#elif PREFILTER == 1
+#elif PREFILTER == PREFILTER_MIPMAP
     (void)apart, (void)dx, (void)dy;
     stored sums[16];
     for (int i = 0; i < 16; ++i) {
@@ -240,7 +241,7 @@ __kernel void next_level(const OcclusionLevel below, const OcclusionLevel level,
     *(__global element16*)(level_of(data, level, texture) + y * level.stride + x) = ELEMENT16(values);
 }
 
-#if PREFILTER == 3
+#if PREFILTER == PREFILTER_SMOOTH
 
 // Of a disc wider than that of the highest level: that level seen from as much nearer to the window's middle, thinned by both widths. Level l stands for a disc
 // 4 sqrt((4^l - 1) / 3) across (mean_of_levels).
@@ -298,7 +299,7 @@ inline __attribute__((always_inline)) floatn bilinear(__global const element* te
 {
     int at[LANES];
     store_int_lanes(places, at);
-#if STORAGE == 1
+#if STORAGE == STORAGE_NORMALIZED16
     // Two neighbours a load.
     int low[LANES], high[LANES];
     for (int lane = 0; lane < LANES; ++lane) low[lane] = as_int(vload2(0, texels + at[lane]));
@@ -336,7 +337,7 @@ inline __attribute__((always_inline)) floatn mean_of_levels(__global const Occlu
     const floatn one = (floatn)(1.0f), zero = (floatn)(0.0f), most = (floatn)(count - 1);
     const floatn highest = widest(count), x = moved(at_x, window.x, size, highest), y = moved(at_y, window.y, size, highest);
     const floatn thinner = select_lanes(one, highest / size, size > highest);
-#if PREFILTER == 3
+#if PREFILTER == PREFILTER_SMOOTH
     // A square of `size` stands for a disc of that diameter, whose variance is size^2 / 16 along each axis; level l has (4^l - 1) / 3.
     const floatn place = 0.5f * log2_of(fma(size * size, (floatn)(3.0f / 16.0f), one));
 #else

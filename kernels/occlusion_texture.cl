@@ -4,8 +4,9 @@
 // Specialisation constants
 //   LANES      receivers a work-item owns
 //   TILE_ROWS  as in soft_shadow_map.cl
-//   PREFILTER  0 N-buffers, 1 mip-maps, 2 summed-area tables, 3 smooth levels (N-buffers of a directional light: 3.5)
-//   STORAGE    of N-buffers, mip-maps and smooth levels: 0 binary32, 1 normalised 16 bits
+//   PREFILTER  NBUFFER, MIPMAP, TABLE (summed-area tables), SMOOTH (N-buffers of a directional light: 3.5); common/choices.h
+//   STORAGE    of N-buffers, mip-maps and smooth levels: BINARY32, NORMALIZED16
+#include "common/choices.h"
 #include "common/shared.h"
 #include "receivers.cl"
 #include "common/lanes.clh"
@@ -37,7 +38,7 @@ __attribute__((always_inline)) inline floatn hidden(const OcclusionLight light, 
     const floatn rise = light.orthographic ? p.z - plane.far : fma((floatn)(-plane.far), p.d, (floatn)(1.0f));
     // From before the plane (a receiver inside its own slice) a point of it is seen.
     const floatn grown = select_lanes((floatn)(0.0f), rise, rise > (floatn)(0.0f)), half_x = grown * plane.half_x, half_y = grown * plane.half_y;
-#if PREFILTER == 2
+#if PREFILTER == PREFILTER_TABLE
     (void)levels;
     return mean_of_table(data + (long)number * (size.x + 1) * (size.y + 1), size, x, y, half_x, half_y);
 #else
@@ -79,16 +80,16 @@ __kernel void occlusion_texture(const ReceiverView view, const OcclusionLight li
         const intn counts = there & (weight > zero);
         if (NONE(counts)) continue;
         const floatn by = select_lanes(zero, weight * hidden(light, plane, i, p, size, levels, data), counts);
-        if (light.combine == 0) lit *= one - by;
-        if (light.combine == 1) sum += by;
-        if (light.combine == 2) greatest = select_lanes(greatest, by, by > greatest);
-        if (light.combine >= 3) of_layer[plane.layer] += by;
+        if (light.combine == COMBINE_PRODUCT) lit *= one - by;
+        if (light.combine == COMBINE_SUM) sum += by;
+        if (light.combine == COMBINE_MAX) greatest = select_lanes(greatest, by, by > greatest);
+        if (light.combine == COMBINE_LAYERED || light.combine == COMBINE_LAYERED_MAX) of_layer[plane.layer] += by;
     }
-    if (light.combine == 1) lit = one - saturate(sum);
-    if (light.combine == 2) lit = one - saturate(greatest);
-    if (light.combine == 3)
+    if (light.combine == COMBINE_SUM) lit = one - saturate(sum);
+    if (light.combine == COMBINE_MAX) lit = one - saturate(greatest);
+    if (light.combine == COMBINE_LAYERED)
         for (int layer = 0; layer < MOST_LAYERS; ++layer) lit *= one - saturate(of_layer[layer]);
-    if (light.combine == 4)
+    if (light.combine == COMBINE_LAYERED_MAX)
         for (int layer = 0; layer < MOST_LAYERS; ++layer) lit = select_lanes(lit, one - saturate(of_layer[layer]), of_layer[layer] > one - lit);
 
     float seen[LANES];

@@ -4,10 +4,11 @@
 //   LANES        receivers that a work-item holds in a vector: 16 or 8 on CPU devices, 1 on GPUs
 //   ITEM_ROWS    rows of receivers that a work-item owns: TILE_ROWS on CPU devices, 1 on GPUs
 //   TILE_ROWS    rows of a tile; a tile is TILE_WIDTH x TILE_ROWS receivers and shares one search
-//   ACCUMULATOR  0 binary32, 1 compensated (Kahan), 2 binary16 (emulated; Appendix A)
+//   ACCUMULATOR  what shares are summed in (common/choices.h): BINARY32, COMPENSATED (Kahan), BINARY16 (emulated; Appendix A)
 //
 // Precision: strict IEEE arithmetic, one correctly rounded division a pair. A share of the light is off by less than 2^-19 where the
 // back-projected texel is no wider than the light (derived in tests/oracle).
+#include "common/choices.h"
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
@@ -47,9 +48,9 @@ inline floatn limits_of(const OccluderView occluders, const float bias, const fl
 }
 
 // Adds u v to a sum. With binary32 the product is not rounded on its own.
-#if ACCUMULATOR == 0
+#if ACCUMULATOR == ACCUMULATOR_BINARY32
 #define ACCUMULATE(sum, lost, u, v) (sum) = fma(u, v, sum)
-#elif ACCUMULATOR == 1
+#elif ACCUMULATOR == ACCUMULATOR_COMPENSATED
 // Kahan: `lost` carries what rounding took from the sum so far.
 #define ACCUMULATE(sum, lost, u, v)                                                                                                                \
     {                                                                                                                                              \

@@ -9,14 +9,15 @@
 //
 // Specialisation constants
 //   LANES, ITEM_ROWS, TILE_ROWS   as in soft_shadow_map.cl
-//   LIGHT        0 rectangle, 1 sphere (the disc that faces the receiver)
-//   COVERAGE     0 linear (Paper I), 1 analytic (Paper IV, 4.2), 2 texture (Paper III, 3.3)
+//   LIGHT        RECTANGLE, or DISC: of a sphere, that which faces the receiver (these and the next: common/choices.h)
+//   COVERAGE     LINEAR (Paper I), ANALYTIC (Paper IV, 4.2), TEXTURE (Paper III, 3.3)
 //   CHANNELS     of the light: 1, or 3 for a coloured texture
-//   LOOKUP       of the table: 0 nearest, 1 bilinear in the second end, 2 bilinear in both
-//   ACCUMULATOR  0 binary32; the papers' buffers, emulated: 1 signed 16 bits with 255 levels (Paper I), 2 six bits (Paper III), 3 twelve bits (Paper IV)
+//   LOOKUP       of the table: NEAREST, BILINEAR in the second end, QUADRILINEAR: bilinear in both
+//   ACCUMULATOR  BINARY32; the papers' buffers, emulated: INT16 with 255 levels (Paper I), SIX_BITS (Paper III), TWELVE_BITS (Paper IV)
 //
 // Light space here: x and y in the light's half extents (its radius: z as well), so that the light is [-1, 1]^2 or the unit disc. A receiver is its tangents
 // t = p.xy / p.z and its disparity d = 1 / p.z. The line from p through e meets the light's plane at (e.xy - t e.z) / (1 - e.z d).
+#include "common/choices.h"
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
@@ -76,9 +77,9 @@ inline float2 before_light(const float az, const float bz)
 }
 
 #include "common/wedge_analytic.clh"
-#if COVERAGE == 0
+#if COVERAGE == COVERAGE_LINEAR
 #include "common/wedge_linear.clh"
-#elif COVERAGE == 2
+#elif COVERAGE == COVERAGE_TEXTURE
 #include "common/wedge_table.clh"
 #endif
 
@@ -89,9 +90,9 @@ __attribute__((always_inline)) inline void shares_beyond(floatn* shares, const E
     (void)index;
     (void)data;
     (void)size;
-#if COVERAGE == 0
+#if COVERAGE == COVERAGE_LINEAR
     shares[0] = share_by_planes(edge, data + index * WEDGE_PLANES, p);
-#elif COVERAGE == 1
+#elif COVERAGE == COVERAGE_ANALYTIC
     shares[0] = share_beyond(edge, p);
 #else
     shares_by_table(shares, edge, p, data, size);
@@ -157,7 +158,7 @@ inline Tile tile_of(const float8 box, const WedgeLight light, const float4 eye)
         tile.d = fmin(tile.d, eye.z);
     }
     tile.reach = (float2)(light.reach_x, light.reach_y);
-#if LIGHT == 1
+#if LIGHT == LIGHT_DISC
     // The disc that faces a receiver is tilted: a line that passes the centre within the radius meets the plane z = 0 within q, q <= (1 + t + q d), as the line's
     // own tangent is below t + q d. No bound, so no culling, where the receiver may be as near as the radius; nor is all that hides the disc then nearer to the
     // light's plane than the receiver: it may be as far from it as the disc reaches, z = 1.
@@ -174,7 +175,7 @@ inline uint chosen(const Tile tile, __global const float* boxes, const int culli
 {
     const uint below = last >= 16 ? 0xffffu : (1u << last) - 1u;
     const uint above = first <= 0 ? 0xffffu : ~((1u << first) - 1u);
-    return below & above & (culling == 0 ? 0xffffu : bits_of(boxes_meet(tile, boxes, use_reach)));
+    return below & above & (culling == CULLING_NONE ? 0xffffu : bits_of(boxes_meet(tile, boxes, use_reach)));
 }
 
 // Between which tangents y a row's receivers lie. Without one: nowhere.
@@ -206,8 +207,8 @@ inline floatn joined(const floatn before, const floatn sheet, const int overlap)
     const floatn one = saturate(sheet);
     const intn bigger = one > before;
     const floatn more = select_lanes(before, one, bigger), less = select_lanes(one, before, bigger);
-    if (overlap == 1) return more;
-    if (overlap == 2) return saturate(fma(less, (floatn)(0.5f), more));
+    if (overlap == OVERLAP_MAX) return more;
+    if (overlap == OVERLAP_HALF_MIN) return saturate(fma(less, (floatn)(0.5f), more));
     return fma(-before, one, before + one);
 }
 
@@ -285,7 +286,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                         const float margin = 0x1p-18f * (fabs(low) + fabs(high));
                         ++count.y;
                         for (int row = 0; row < ITEM_ROWS; ++row)
-                            if (light.culling == 0 || (high + margin >= spans[row].x && low - margin <= spans[row].y)) {
+                            if (light.culling == CULLING_NONE || (high + margin >= spans[row].x && low - margin <= spans[row].y)) {
                                 const intn behind = behind_triangle(triangle, light, receivers_at(light, view.stride, xi, eta, d, x, y + row));
                                 for (int channel = 0; channel < CHANNELS; ++channel) add_hard(&sums[channel][row], behind);
                             }
@@ -297,11 +298,11 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                 uint group_bits = chosen(tile, edge_boxes + groups * 5, light.culling, 1.0f, sheet.edges_begin - groups, sheet.edges_end - groups);
                 while (group_bits) {
                     const int group = groups + take_bit(&group_bits);
-                    uint bits = light.culling == 0 ? 0xffffu : bits_of(edges_meet(tile, edge_ends + group * 96, light.culling == 1));
+                    uint bits = light.culling == CULLING_NONE ? 0xffffu : bits_of(edges_meet(tile, edge_ends + group * 96, light.culling == CULLING_LOOSE));
                     while (bits) {
                         const int index = group * 16 + take_bit(&bits);
-#if COVERAGE == 0
-                        if (light.culling != 0 && !wedge_meets(tile, coverage + index * WEDGE_PLANES)) continue;
+#if COVERAGE == COVERAGE_LINEAR
+                        if (light.culling != CULLING_NONE && !wedge_meets(tile, coverage + index * WEDGE_PLANES)) continue;
 #endif
                         const float8 e = vload8(index, edges);
                         const Edge edge = {e.s0, e.s1, e.s2, e.s3, e.s4, e.s5, e.s6};
@@ -322,7 +323,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                 for (int row = 0; row < ITEM_ROWS; ++row) {
                     const floatn sheet_occlusion = occlusion_of(&sums[channel][row]), before = occlusion[channel][row];
                     if (alone) first[channel][row] = (floatn)(0.0f);
-                    occlusion[channel][row] = light.overlap == 0 ? before + added(sheet_occlusion, sheet.side, &first[channel][row])
+                    occlusion[channel][row] = light.overlap == OVERLAP_SUM ? before + added(sheet_occlusion, sheet.side, &first[channel][row])
                                                                  : joined(before, sheet_occlusion, light.overlap);
                 }
         }

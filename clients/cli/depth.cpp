@@ -12,6 +12,7 @@
 #include "mask_files.hpp"
 #include "progress.hpp"
 #include "streams.hpp"
+#include "technique/techniques.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
 
@@ -88,8 +89,8 @@ int run(const Flags& flags)
     Scene scene = read_scene(flags.scene);
     scene.technique = in_scene(flags.scene, [&] { return apply(scene.technique, flags.technique); });
     const Technique technique = technique_from(scene.technique);
-    if (std::holds_alternative<RayTraced>(technique))
-        throw Error(ErrorCode::usage, flags.scene + ": ray_traced works on objects, not on depth images",
+    if (needs_of(technique).casters == Needs::Casters::required)
+        throw Error(ErrorCode::usage, flags.scene + ": " + kind_of(technique) + " works on objects, not on depth images",
                     "choose another with --technique");
 
     progress.step("rendering depth");

@@ -8,6 +8,7 @@
 #include "engine/geometry.hpp"
 #include "scene/light_space.hpp"
 #include "scene/lights.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
@@ -29,15 +30,6 @@ double place_tolerance(const LightFrame& light, const Vec3& origin)
 }
 
 } // namespace
-
-DepthNeeds needs_of(const Technique& technique)
-{
-    if (const auto* settings = std::get_if<SoftShadowMap>(&technique))
-        return {.front = settings->sides != Sides::back, .back = settings->sides != Sides::front, .receivers = true};
-    return {.front = std::holds_alternative<ShadowMap>(technique) || std::holds_alternative<Smoothie>(technique),
-            .back = false,
-            .receivers = true};
-}
 
 Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height)
 {
@@ -83,7 +75,7 @@ void check_size(const DepthMap& map, int width, int height, std::string_view whe
                     "expected " + std::to_string(width) + " x " + std::to_string(height));
 }
 
-Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const DepthNeeds& needs)
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs)
 {
     Occluders occluders = given;
     if (!needs.front && !needs.back) return occluders;

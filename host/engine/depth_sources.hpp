@@ -4,20 +4,16 @@
 #include <penumbra/engine.hpp>
 
 #include "scene/camera.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
-
-struct DepthNeeds {
-    bool front = false, back = false, receivers = true;
-};
-DepthNeeds needs_of(const Technique& technique);
 
 // The light's own view at the occluder map's size. Throws invalid_input when the scene says another camera than the light's.
 Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height);
 
 // The occluders with what `needs` names in place and their camera explicit. Throws invalid_input naming what is missing when there are no
 // objects to render it from, and for maps whose sizes do not fit. The same for receivers: with_depth (engine.hpp).
-Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const DepthNeeds& needs);
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs);
 
 // Throws too_large for more pixels than any map may have, before memory is taken for them.
 void check_pixels(int width, int height, std::string_view where);

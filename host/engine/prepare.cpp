@@ -6,10 +6,9 @@
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/impl.hpp"
-#include "engine/prepare.hpp"
 #include "engine/state.hpp"
 #include "scene/lights.hpp"
-#include "technique/table.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
@@ -44,25 +43,7 @@ std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::C
     state->context = context;
     state->technique = technique;
     state->light = light;
-    if (std::holds_alternative<ShadowMap>(technique) && !has_no_extent(light))
-        state->warnings.push_back("shadow_map takes the light as a point at its centre: its extent is ignored");
     return state;
-}
-
-constexpr const char* empty_map = "the occluder map is empty: nothing casts shadows";
-
-// Runs the technique's prepare step on depth that is on the device.
-void prepare_maps(opencl::Work& work, const OccluderDepth& depth, Prepared::State& state)
-{
-    work.stage("prepare");
-    if (const auto* settings = std::get_if<SoftShadowMap>(&state.technique)) {
-        auto prepared = prepare_soft_shadow_map(work, depth, *settings);
-        if (prepared.nearest == 0) state.warnings.push_back(empty_map);
-        state.data = std::move(prepared);
-    } else {
-        state.data = prepare_shadow_map(work, depth, std::get<ShadowMap>(state.technique));
-    }
-    finish_prepare(work, state);
 }
 
 bool inside_view(const Projected& p) { return p.depth > 0 && std::abs(p.x_px - 1) <= 1 && std::abs(p.y_px - 1) <= 1; }
@@ -95,68 +76,82 @@ bool casters_inside(const std::vector<Object>& objects, const Camera& view)
     return true;
 }
 
-OccluderDepth uploaded(opencl::Work& work, const Light& light, const Occluders& occluders, const Camera& view, const DepthNeeds& needs,
-                       std::vector<opencl::Buffer<float>>& keep)
+// Throws invalid_input when the technique wants objects that cast, or a map in their place, and the scene has none.
+void check_casters(const Needs& needs, bool casters, const Occluders& given, const std::string& technique)
 {
-    OccluderDepth depth{.light = light_frame(light),
-                        .camera = view,
-                        .width = occluders.width,
-                        .height = occluders.height,
-                        .precision = 0,
-                        .front = {},
-                        .back = {}};
-    const auto upload = [&](const DepthMap& map, const char* what) {
-        depth.precision = std::max(depth.precision, map.precision);
-        keep.push_back(work.upload(std::span<const float>(map.depth), what));
-        return keep.back().memory();
+    if (casters || needs.casters == Needs::Casters::unused) return;
+    if (needs.casters == Needs::Casters::required)
+        throw Error(ErrorCode::invalid_input, "objects: " + technique + " needs objects that cast, and there are none",
+                    "expected meshes, quads, or a camera's depth as an object");
+    if (!given.front)
+        throw Error(ErrorCode::invalid_input,
+                    "objects: " + technique + " needs objects that cast or occluders.depth.front, and there are neither",
+                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
+}
+
+// The maps that prepare is handed: those that it needs, or all that there are where they stand for the objects.
+LightDepth depth_of(const Light& light, const Occluders& occluders, const std::vector<Object>& objects, const Needs& needs, bool all)
+{
+    const auto taken = [&](const std::optional<DepthMap>& map, bool wanted, const char* where) -> const DepthMap* {
+        if (!map || !wanted) return nullptr;
+        check_size(*map, occluders.width, occluders.height, where);
+        return &*map;
     };
-    work.stage("upload occluders");
-    if (needs.front) depth.front = upload(*occluders.front, "front occluder depth");
-    if (needs.back) depth.back = upload(*occluders.back, "back occluder depth");
+    LightDepth depth{.camera = {},
+                     .width = occluders.width,
+                     .height = occluders.height,
+                     .front = taken(occluders.front, all || needs.front, "occluders.depth.front"),
+                     .back = taken(occluders.back, all || needs.back, "occluders.depth.back"),
+                     .layers = {},
+                     .device_front = {},
+                     .device_back = {}};
+    if (all) depth.layers = occluders.layers;
+    for (std::size_t i = 0; i < depth.layers.size(); ++i)
+        check_size(depth.layers[i], depth.width, depth.height, "occluders.depth.layers[" + std::to_string(i) + "]");
+    depth.camera = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height);
     return depth;
 }
 
-std::shared_ptr<Prepared::State> prepare_from_maps(const std::shared_ptr<const opencl::Context>& context, const Light& light,
-                                                   const Occluders& occluders, const std::vector<Object>& objects,
-                                                   const Technique& technique)
+std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry)
 {
-    auto state = new_state(context, light, technique);
-    const DepthNeeds needs = needs_of(technique);
-    if (needs.front && !occluders.front)
-        throw Error(ErrorCode::invalid_input, "occluders.depth.front: is missing",
-                    "expected a depth map; with_depth renders it from objects");
-    if (needs.back && !occluders.back)
-        throw Error(ErrorCode::invalid_input, "occluders.depth.back: is missing",
-                    "expected a depth map, or sides front; with_depth renders it from objects");
-    if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
-    if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");
-    state->light_view = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height);
-
-    const auto there = [](float depth) { return depth > 0 && std::isfinite(depth); };
-    if (std::holds_alternative<ShadowMap>(technique) && std::none_of(occluders.front->depth.begin(), occluders.front->depth.end(), there))
-        state->warnings.push_back(empty_map);
-
-    opencl::Work work(context);
-    std::vector<opencl::Buffer<float>> maps;
-    const OccluderDepth depth = uploaded(work, light, occluders, state->light_view, needs, maps);
-    prepare_maps(work, depth, *state);
-    return state;
+    std::vector<const TriangleMesh*> meshes;
+    for (const Object& object : geometry.objects())
+        if (object.casts) meshes.push_back(&object.mesh);
+    return meshes;
 }
 
-std::shared_ptr<Prepared::State> prepare_from_objects(std::shared_ptr<Prepared::State> state, const Geometry& geometry,
-                                                      const RayTraced& settings)
+// Ends the work and notes in the state what it took.
+void finish_prepare(opencl::Work& work, Prepared::State& state)
 {
-    if (!geometry.state().any(&Object::casts))
-        throw Error(ErrorCode::invalid_input, "objects: ray_traced needs objects that cast, and there are none",
-                    "expected meshes, quads, or a camera's depth as an object");
-    const Stopwatch watch;
-    PreparedRays rays{.settings = settings, .light = state->light, .casters = geometry.state().casters()};
-    state->prepare_ms = watch.ms();
-    state->stages.push_back({"prepare", state->prepare_ms, 0, rays.casters->bytes()});
-    if (rays.casters->degenerate_count() > 0)
-        state->warnings.push_back(std::to_string(rays.casters->degenerate_count()) + " triangles without area were left out");
-    state->data = std::move(rays);
-    return state;
+    add_stages(state.stages, work.finish());
+    state.prepare_ms = work_ms(state.stages);
+    state.peak_bytes = work.memory().peak;
+    state.memory = work.memory_ptr();
+}
+
+// Runs the technique's own step and keeps what it made and said.
+void prepare_technique(Prepared::State& state, const Casting& casting)
+{
+    opencl::Work work(state.context);
+    Findings findings;
+    state.data = std::visit(
+        [&](const auto& settings) -> PreparedTechnique { return prepare(work, casting, settings, findings); }, state.technique);
+    state.light_view = findings.view;
+    state.channels = findings.channels;
+    state.warnings.insert(state.warnings.end(), findings.warnings.begin(), findings.warnings.end());
+    state.notes = std::move(findings.notes);
+    finish_prepare(work, state);
+}
+
+PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechnique& before, const Light& light)
+{
+    const auto call = [&](const auto& prepared) -> PreparedTechnique {
+        if constexpr (requires { with_emission(work, prepared, light); })
+            return with_emission(work, prepared, light);
+        else
+            throw Error(ErrorCode::internal, "a technique takes textured lights and has no with_emission");
+    };
+    return std::visit(call, before);
 }
 
 } // namespace
@@ -198,31 +193,9 @@ void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more)
     }
 }
 
-void finish_prepare(opencl::Work& work, Prepared::State& state)
-{
-    add_stages(state.stages, work.finish());
-    state.prepare_ms = work_ms(state.stages);
-    state.peak_bytes = work.memory().peak;
-    state.memory = work.memory_ptr();
-}
-
-bool casts_or_shown(const Geometry& geometry, const Occluders& given, const char* technique)
-{
-    const bool objects = geometry.state().any(&Object::casts);
-    if (!objects && !given.front)
-        throw Error(ErrorCode::invalid_input,
-                    std::string("objects: ") + technique + " needs objects that cast or occluders.depth.front, and there are neither",
-                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
-    return objects;
-}
-
 Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Technique& technique) const
 {
-    if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
-    if (std::holds_alternative<SoftShadowVolume>(technique) || std::holds_alternative<OcclusionTexture>(technique) ||
-        std::holds_alternative<Smoothie>(technique))
-        return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
-    return Prepared(prepare_from_maps(impl_->context, light, occluders, {}, technique));
+    return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
 }
 
 Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
@@ -235,29 +208,29 @@ Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 
 Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique) const
 {
-    if (const auto* settings = std::get_if<RayTraced>(&technique))
-        return Prepared(prepare_from_objects(new_state(impl_->context, light, technique), geometry, *settings));
+    auto state = new_state(impl_->context, light, technique);
+    const Needs needs = needs_of(technique);
+    const bool maps = needs.front || needs.back;
+    Casting casting{.light = state->light,
+                    .depth = {},
+                    .meshes = casting_meshes(geometry),
+                    .topology = [&] { return geometry.state().topology(); },
+                    .tracer = [&] { return geometry.state().casters(); }};
+    check_casters(needs, !casting.meshes.empty(), given, kind_of(technique));
 
-    if (const auto* settings = std::get_if<SoftShadowVolume>(&technique))
-        return Prepared(prepare_wedges(new_state(impl_->context, light, technique), given, geometry, *settings));
+    // Render what the maps lack.
+    Occluders complete;
+    if (maps) {
+        const Stopwatch watch;
+        complete = occluders_with_depth(light, given, geometry, needs);
+        state->stages.push_back({"render depth", watch.ms(), 0, 0});
+    }
+    const bool shown = casting.meshes.empty() && needs.casters == Needs::Casters::or_front;
+    if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, shown);
 
-    if (const auto* settings = std::get_if<OcclusionTexture>(&technique))
-        return Prepared(prepare_slices(new_state(impl_->context, light, technique), given, geometry, *settings));
-
-    validate(light);
-    check_light(light, technique);
-    refuse_sequence(light);
-    const Stopwatch watch;
-    const Occluders occluders = occluders_with_depth(light, given, geometry, needs_of(technique));
-    const Stage render{"render depth", watch.ms(), 0, 0};
-    const auto* smoothie = std::get_if<Smoothie>(&technique);
-    auto state = smoothie ? prepare_smoothies(new_state(impl_->context, light, technique), occluders, geometry, *smoothie)
-                          : prepare_from_maps(impl_->context, light, occluders, geometry.objects(), technique);
-    state->stages.insert(state->stages.begin(), render);
-    if (smoothie) return Prepared(state);
-    state->covered = !geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view);
-    const auto* soft = std::get_if<SoftShadowMap>(&technique);
-    if (soft && soft->project && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
+    prepare_technique(*state, casting);
+    state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view));
+    if (needs.receivers_from_light && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
     return Prepared(state);
 }
 
@@ -269,15 +242,11 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     auto state =
         new_state(before.context, RectangleLight{rectangle->center, rectangle->half_u, rectangle->half_v, emission}, before.technique);
     state->light_view = before.light_view;
+    state->channels = emission.channels;
     state->covered = before.covered;
     state->warnings = before.warnings;
-    if (const auto* rays = std::get_if<PreparedRays>(&before.data)) {
-        state->data = PreparedRays{.settings = rays->settings, .light = state->light, .casters = rays->casters};
-        return Prepared(state);
-    }
     opencl::Work work(state->context);
-    work.stage("prepare");
-    state->data = with_emission_of(work, std::get<PreparedSoftShadowVolume>(before.data), state->light);
+    state->data = under_other_emission(work, before.data, state->light);
     finish_prepare(work, *state);
     state->shared = before.shared ? before.shared : before.memory;
     return Prepared(state);
@@ -285,34 +254,23 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
 
 Prepared Engine::prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const
 {
-    if (std::holds_alternative<RayTraced>(technique)) throw Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene");
-    if (std::holds_alternative<Smoothie>(technique))
-        throw Error(ErrorCode::unsupported, "smoothie finds silhouettes on the host and cannot prepare from device buffers",
-                    "prepare it from objects, or from depth maps in memory");
-    if (std::holds_alternative<OcclusionTexture>(technique))
-        throw Error(ErrorCode::unsupported,
-                    "occlusion_texture makes surfaces of depth maps on the host and cannot prepare from device buffers",
-                    "prepare it from objects, or from depth maps in memory");
-    if (std::holds_alternative<SoftShadowVolume>(technique))
-        throw Error(ErrorCode::unsupported, "soft_shadow_volume finds silhouettes on the host and cannot prepare from device buffers",
-                    "prepare it from objects, or from depth maps in memory");
+    if (const auto refused = device_buffers_of(technique).prepare) throw *refused;
     auto state = new_state(impl_->context, light, technique);
-    const DepthNeeds needs = needs_of(technique);
-    if (needs.front) check_device_buffer(occluders.front, occluders.width, occluders.height, "occluders.front");
-    if (needs.back) check_device_buffer(occluders.back, occluders.width, occluders.height, "occluders.back");
-    state->light_view = occluder_camera(light, occluders.camera, {}, occluders.width, occluders.height);
-
-    opencl::Work work(impl_->context);
-    OccluderDepth depth{.light = light_frame(light),
-                        .camera = state->light_view,
-                        .width = occluders.width,
-                        .height = occluders.height,
-                        .precision = 0x1p-24,
-                        .front = {},
-                        .back = {}};
-    if (needs.front) depth.front = cl::Buffer(occluders.front, true);
-    if (needs.back) depth.back = cl::Buffer(occluders.back, true);
-    prepare_maps(work, depth, *state);
+    const Needs needs = needs_of(technique);
+    const auto taken = [&](cl_mem memory, bool wanted, const char* what) {
+        if (!wanted) return cl::Buffer();
+        check_device_buffer(memory, occluders.width, occluders.height, what);
+        return cl::Buffer(memory, true);
+    };
+    const LightDepth depth{.camera = occluder_camera(light, occluders.camera, {}, occluders.width, occluders.height),
+                           .width = occluders.width,
+                           .height = occluders.height,
+                           .front = nullptr,
+                           .back = nullptr,
+                           .layers = {},
+                           .device_front = taken(occluders.front, needs.front, "occluders.front"),
+                           .device_back = taken(occluders.back, needs.back, "occluders.back")};
+    prepare_technique(*state, {.light = state->light, .depth = depth, .meshes = {}, .topology = {}, .tracer = {}});
     return Prepared(state);
 }
 

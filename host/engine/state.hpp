@@ -4,18 +4,12 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include <penumbra/engine.hpp>
 
 #include "opencl/work.hpp"
-#include "technique/occlusion_texture.hpp"
-#include "technique/ray_traced.hpp"
-#include "technique/shadow_map.hpp"
-#include "technique/smoothie.hpp"
-#include "technique/soft_shadow_map.hpp"
-#include "technique/soft_shadow_volume.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra {
 
@@ -32,12 +26,11 @@ struct Prepared::State {
     std::shared_ptr<const opencl::Context> context;
     Technique technique;
     Light light;
-    Camera light_view;                             // of the occluder map; unused by rays
+    Camera light_view;                             // that receivers come in; unused by rays
+    int channels = 1;                              // of the visibility
     bool covered = false;                          // every caster is known to lie inside the occluder map
-    std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, for `project`; may be null
-    std::variant<PreparedRays, PreparedShadowMap, PreparedSoftShadowMap, PreparedSoftShadowVolume, PreparedOcclusionTexture,
-                 PreparedSmoothie>
-        data;
+    std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, where the technique wants the light's view of them; may be null
+    PreparedTechnique data;
 
     std::vector<Stage> stages;
     double prepare_ms = 0;

@@ -1,6 +1,8 @@
 #include "opencl/program_cache.hpp"
 
 #include <chrono>
+#include <cstdlib>
+#include <fstream>
 #include <utility>
 
 #include "opencl/cache_folder.hpp"
@@ -12,6 +14,15 @@ namespace {
 
 // Nothing that lets a compiler assume finite numbers or approximate: depth holds infinities, and results are compared bit by bit.
 constexpr const char* build_options = "-cl-std=CL1.2";
+
+// For the test that every program anybody asks for is among those that the build compiles: a line for each goes to the file that
+// PENUMBRA_PROGRAM_LOG names. One write a line, so that many processes may share the file.
+void note_program(const std::string& id)
+{
+    const char* const path = std::getenv("PENUMBRA_PROGRAM_LOG");
+    if (!path) return;
+    if (std::ofstream log(path, std::ios::app); log) log << id + '\n' << std::flush;
+}
 
 // The first line that tells of an error, or the first line at all.
 std::string first_error_line(const std::string& log)
@@ -45,7 +56,12 @@ cl::Program ProgramCache::program(const Specialisation& specialisation, double& 
     // The embedded files do not change while the process runs, so names and values say it all.
     const std::string id = specialisation.file + ' ' + specialisation.options();
     return find_or_build(
-        id, specialisation.file, [&] { return program_text(specialisation); }, compile_ms);
+        id, specialisation.file,
+        [&] {
+            note_program(id);
+            return program_text(specialisation);
+        },
+        compile_ms);
 }
 
 cl::Program ProgramCache::program(const std::string& name, const std::string& text, double& compile_ms)

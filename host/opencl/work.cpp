@@ -247,6 +247,12 @@ void Work::stage(const char* name)
     started_ = Clock::now();
 }
 
+void Work::moved(std::uint64_t bytes)
+{
+    ensure_stage();
+    stages_[current_].bytes += bytes;
+}
+
 void Work::ensure_stage()
 {
     if (!running_) stage("work");

@@ -94,6 +94,8 @@ public:
     // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name
     // are joined. What a stage spends building programs is taken out of it and reported as the stage "compile".
     void stage(const char* name);
+    // Counts bytes that the running stage moved on the host.
+    void moved(std::uint64_t bytes);
     // Ends the last stage and returns all; the next stage starts afresh. On the caller's queue device_ms is 0 for stages that are still
     // under way or not profiled. With canaries: Error(internal) when any buffer's guard tail was written to.
     std::vector<Stage> finish();

@@ -1,6 +1,11 @@
 // Makes SettingKeys from members of a settings struct.
 #pragma once
 
+#include <array>
+#include <cctype>
+#include <string>
+#include <utility>
+
 #include "technique/table.hpp"
 
 namespace penumbra {
@@ -38,10 +43,13 @@ SettingKey real_key(std::string_view name, double Settings::*member, RealRange r
             [member](Technique& t, const SettingValue& v) { std::get<Settings>(t).*member = std::get<double>(v); }};
 }
 
-// `names` in the order of the enumerators, which count from 0.
-template <class Settings, class Enum>
-SettingKey choice_key(std::string_view name, Enum Settings::*member, std::vector<std::string_view> names, std::string_view meaning)
+// The names of an enumeration's values, as users write them: in the order of the enumerators, which count from 0.
+template <std::size_t count> using Names = std::array<std::string_view, count>;
+
+template <class Settings, class Enum, std::size_t count>
+SettingKey choice_key(std::string_view name, Enum Settings::*member, const Names<count>& all, std::string_view meaning)
 {
+    const std::vector<std::string_view> names(all.begin(), all.end());
     return {name,
             "",
             meaning,
@@ -53,6 +61,15 @@ SettingKey choice_key(std::string_view name, Enum Settings::*member, std::vector
                 for (std::size_t i = 0; i < names.size(); ++i)
                     if (names[i] == std::get<std::string>(v)) std::get<Settings>(t).*member = static_cast<Enum>(i);
             }};
+}
+
+// A choice on its way to the kernels, by name: ("ACCUMULATOR", "ACCUMULATOR_BINARY32"), which kernels/common/choices.h defines.
+template <class Enum, std::size_t count>
+std::pair<std::string, std::string> choice_constant(const std::string& constant, const Names<count>& names, Enum choice)
+{
+    std::string value = constant + '_';
+    for (const char c : names.at(static_cast<std::size_t>(choice))) value += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    return {constant, value};
 }
 
 } // namespace penumbra

@@ -15,6 +15,32 @@ float light_scale(double tangent, double half_extent)
 
 } // namespace
 
+opencl::Specialisation occluders_program() { return {"occluders.cl", {}}; }
+
+DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back)
+{
+    const LightDepth& from = casting.depth;
+    DeviceDepth result{.depth = {.light = light_frame(casting.light),
+                                 .camera = from.camera,
+                                 .width = from.width,
+                                 .height = from.height,
+                                 .precision = 0,
+                                 .front = from.device_front,
+                                 .back = from.device_back},
+                       .uploaded = {}};
+    OccluderDepth& depth = result.depth;
+    const auto upload = [&](const DepthMap& map, const char* what) {
+        if (result.uploaded.empty()) work.stage("upload occluders");
+        depth.precision = std::max(depth.precision, map.precision);
+        result.uploaded.push_back(work.upload(std::span<const float>(map.depth), what));
+        return result.uploaded.back().memory();
+    };
+    if (front && from.front) depth.front = upload(*from.front, "front occluder depth");
+    if (back && from.back) depth.back = upload(*from.back, "back occluder depth");
+    if (result.uploaded.empty()) depth.precision = 0x1p-24;
+    return result;
+}
+
 MapSize reduced_size(int width, int height, int resolution)
 {
     const int longer = std::max(width, height);

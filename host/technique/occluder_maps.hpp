@@ -7,7 +7,7 @@
 #include "opencl/work.hpp"
 #include "scene/camera.hpp"
 #include "scene/light_space.hpp"
-#include "technique/constants.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -19,6 +19,20 @@ struct OccluderDepth {
     double precision = 0; // relative, of the depths
     cl::Buffer front, back;
 };
+
+// The program of occluders.cl by itself (see receivers_program).
+opencl::Specialisation occluders_program();
+
+// The maps that prepare was handed, on the device: uploaded in a stage of their own unless they are there already. What is not asked for is
+// left out. The buffers have to live until the last launch that reads them.
+struct DeviceDepth {
+    OccluderDepth depth;
+    std::vector<opencl::Buffer<float>> uploaded;
+};
+DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back);
+
+// What a technique says when its map holds nothing.
+constexpr const char* empty_map = "the occluder map is empty: nothing casts shadows";
 
 // One map, ready to be shaded with.
 struct OccluderMap {
@@ -39,6 +53,6 @@ OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
 // Disparity and covered share at `size`, and the surface's steps; depths are right to the relative `precision`.
 // `program`: one that has the kernels.
 OccluderMap occluder_map(opencl::Work& work, const cl::Buffer& depth, MapSize from, MapSize size, Reduction reduction, double precision,
-                         const opencl::Specialisation& program = OccludersConstants{}.specialisation());
+                         const opencl::Specialisation& program = occluders_program());
 
 } // namespace penumbra

@@ -5,26 +5,50 @@
 
 #include <penumbra/error.hpp>
 
-#include "technique/constants.hpp"
 #include "technique/keys.hpp"
 #include "technique/occlusion_levels.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
 namespace {
 
 constexpr double most_taps = 16;
 
-LevelKind level_kind(const LightFrame& light, const OcclusionTexture& settings)
+constexpr Names<3> placement_names{"uniform", "reciprocal", "occupied"};
+constexpr Names<3> prefilter_names{"nbuffer", "mipmap", "summed_area"};
+constexpr Names<4> level_names{"nbuffer", "mipmap", "table", "smooth"}; // of LevelKind
+constexpr Names<2> storage_names{"binary32", "normalized16"};
+constexpr Names<5> combine_names{"product", "sum", "max", "layered", "layered_max"};
+constexpr Names<3> self_shadow_names{"fade", "own", "omit"};
+
+static_assert(static_cast<int>(Combine::product) == COMBINE_PRODUCT && static_cast<int>(Combine::sum) == COMBINE_SUM);
+static_assert(static_cast<int>(Combine::max) == COMBINE_MAX && static_cast<int>(Combine::layered) == COMBINE_LAYERED);
+static_assert(static_cast<int>(Combine::layered_max) == COMBINE_LAYERED_MAX);
+
+LevelKind level_kind(bool directional, const OcclusionTexture& settings)
 {
     if (settings.prefilter == Prefilter::summed_area) return LevelKind::table;
     if (settings.prefilter == Prefilter::mipmap) return LevelKind::mipmap;
-    return light.directional ? LevelKind::smooth : LevelKind::nbuffer;
+    return directional ? LevelKind::smooth : LevelKind::nbuffer;
 }
 
 std::size_t element_size(LevelKind kind, const OcclusionTexture& settings)
 {
     return kind != LevelKind::table && settings.storage == LevelStorage::normalized16 ? 2 : 4;
+}
+
+opencl::Specialisation program(int lanes, LevelKind kind, const OcclusionTexture& settings)
+{
+    return {"occlusion_texture.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"TILE_ROWS", std::to_string(tile_rows)},
+             choice_constant("PREFILTER", level_names, kind),
+             choice_constant("STORAGE", storage_names,
+                             element_size(kind, settings) == 2 ? LevelStorage::normalized16 : LevelStorage::binary32)}};
+}
+
+bool is_layered(const OcclusionTexture& settings)
+{
+    return settings.combine == Combine::layered || settings.combine == Combine::layered_max;
 }
 
 void check_settings(const LightFrame& light, const OcclusionTexture& settings)
@@ -45,7 +69,7 @@ void check_settings(const LightFrame& light, const OcclusionTexture& settings)
 std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<float>& depths, const SlicePart& part,
                                       const OcclusionTexture& settings)
 {
-    const bool layered = settings.combine == Combine::layered || settings.combine == Combine::layered_max;
+    const bool layered = is_layered(settings);
     std::vector<OcclusionPlane> planes;
     for (std::size_t k = 0; k + 1 < depths.size(); ++k) {
         const double near = depths[k], far = depths[k + 1], next = k + 2 < depths.size() ? depths[k + 2] : far + (far - near);
@@ -202,7 +226,7 @@ std::string what_fits(const Marked& marked, std::uint64_t most, LevelKind kind, 
     }
     Marked nearest = marked;
     nearest.planes.resize(1);
-    const bool layered = settings.combine == Combine::layered || settings.combine == Combine::layered_max;
+    const bool layered = is_layered(settings);
     const std::uint64_t slices = most / layout_of(nearest, kind).elements / static_cast<std::uint64_t>(layered ? settings.layers : 1);
     if (fits == 0)
         return slices == 0 ? "expected fewer slices and a lower resolution" : "expected at most " + std::to_string(slices) + " slices";
@@ -258,7 +282,7 @@ void build_levels(opencl::Work& work, const opencl::Specialisation& program, con
 PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Specialisation& program, const Scenery& scenery,
                                        const SlicePart& part, float share, const OcclusionTexture& settings, std::string& note)
 {
-    const LevelKind kind = level_kind(scenery.light, settings);
+    const LevelKind kind = level_kind(scenery.light.directional, settings);
     work.stage("slices");
     Marked marked = marked_slices(work, program, scenery, part, settings);
     set_levels(marked, kind, scenery.light.directional);
@@ -333,9 +357,18 @@ Scenery scenery_of(opencl::Work& work, const LightFrame& frame, std::span<const 
     return scenery;
 }
 
+// What the maps show as triangles: of both sides of the solid, and of further layers.
+std::vector<TriangleMesh> surfaces_of(const LightDepth& maps)
+{
+    std::vector<TriangleMesh> meshes{mesh_of_texels(*maps.front, maps.camera)};
+    if (maps.back) meshes.push_back(mesh_of_texels(*maps.back, maps.camera));
+    for (const DepthMap& layer : maps.layers) meshes.push_back(mesh_of_texels(layer, maps.camera));
+    return meshes;
+}
+
 } // namespace
 
-TechniqueRow occlusion_texture_row()
+TechniqueRow row(const OcclusionTexture&)
 {
     using S = OcclusionTexture;
     return {.kind = "occlusion_texture",
@@ -343,19 +376,19 @@ TechniqueRow occlusion_texture_row()
                        "number moves.",
             .source = "Eisemann, Decoret: Occlusion Textures for Plausible Soft Shadows, Computer Graphics Forum 2008",
             .keys = {integer_key<S>("slices", &S::slices, {1, 64}, "slices", "along the light's axis"),
-                     choice_key<S>("placement", &S::placement, {"uniform", "reciprocal", "occupied"},
+                     choice_key<S>("placement", &S::placement, placement_names,
                                    "slices of even depth, of even 1 / depth, or with as much of the casters' area in each"),
                      integer_key<S>("resolution", &S::resolution, {4, 4096}, "texels", "along each side of a slice"),
-                     choice_key<S>("prefilter", &S::prefilter, {"nbuffer", "mipmap", "summed_area"},
+                     choice_key<S>("prefilter", &S::prefilter, prefilter_names,
                                    "how a slice's mean over any square is had; summed_area is exact and takes rectangles"),
-                     choice_key<S>("storage", &S::storage, {"binary32", "normalized16"}, "of N-buffers and mip-maps"),
-                     choice_key<S>("combine", &S::combine, {"product", "sum", "max", "layered", "layered_max"},
+                     choice_key<S>("storage", &S::storage, storage_names, "of N-buffers and mip-maps"),
+                     choice_key<S>("combine", &S::combine, combine_names,
                                    "of slices: Eq. 5, for comparison the sum and the greatest; layered: the sum within a depth layer, the "
                                    "product (or the greatest) across"),
                      integer_key<S>("layers", &S::layers, {1, 8}, "layers", "layered: depth layers; the last one takes what lies behind"),
                      flag_key<S>("leak_fix", &S::leak_fix, "each slice is seen in the next one away from the light too (3.4.1)"),
                      choice_key<S>(
-                         "self_shadow", &S::self_shadow, {"fade", "own", "omit"},
+                         "self_shadow", &S::self_shadow, self_shadow_names,
                          "near a slice: the one before the receiver's own fades in, the own one fades in, or the own one is left out at "
                          "once (3.4.2)"),
                      integer_key<S>("light_splits", &S::light_splits, {1, 16}, "parts",
@@ -374,12 +407,9 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
     work.stage("casters");
     LightFrame frame = light_frame(light);
     check_settings(frame, settings);
-    const LevelKind kind = level_kind(frame, settings);
+    const LevelKind kind = level_kind(frame.directional, settings);
     PreparedOcclusionTexture prepared{.settings = settings,
-                                      .program = OcclusionTextureConstants{.lanes = work.context().quirks().lanes,
-                                                                           .prefilter = static_cast<int>(kind),
-                                                                           .storage = element_size(kind, settings) == 2 ? 1 : 0}
-                                                     .specialisation(),
+                                      .program = program(work.context().quirks().lanes, kind, settings),
                                       .view = light_camera(frame, {1, 1}, frame.origin),
                                       .parts = {},
                                       .warnings = {},
@@ -439,6 +469,61 @@ void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture&
     if (!counts) return;
     for (const PreparedOcclusionTexture::Part& part : prepared.parts)
         counts->pairs += static_cast<std::uint64_t>(view.width) * height * static_cast<std::uint64_t>(part.light.planes);
+}
+
+Needs needs(const OcclusionTexture&) { return {.casters = Needs::Casters::or_front}; }
+
+PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, const OcclusionTexture& settings, Findings& findings)
+{
+    const LightDepth& maps = casting.depth;
+    std::vector<TriangleMesh> surfaces;
+    std::vector<const TriangleMesh*> meshes = casting.meshes;
+    if (meshes.empty()) {
+        work.stage("surfaces of depth maps");
+        surfaces = surfaces_of(maps);
+        for (const TriangleMesh& mesh : surfaces) meshes.push_back(&mesh);
+    }
+    std::optional<SolidMaps> solid;
+    if (casting.meshes.empty() && maps.back) solid.emplace(*maps.front, *maps.back, maps.camera);
+
+    PreparedOcclusionTexture prepared =
+        prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings);
+    findings.view = prepared.view;
+    findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
+    findings.notes = prepared.notes;
+    return prepared;
+}
+
+void shade(opencl::Work& work, const PreparedOcclusionTexture& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("shade");
+    shade_occlusion_texture(work, prepared, points, shaded.visibility, shaded.counts);
+}
+
+std::vector<WorkAmount> work(const OcclusionTexture& settings, const MaskShape& shape)
+{
+    // Lookups of a receiver, and texels of the slices that are prefiltered.
+    const double textures = shape.lights() * settings.light_splits * settings.light_splits * settings.slices *
+        (is_layered(settings) ? settings.layers : 1);
+    return {{"technique.slices", textures * shape.pixels(), WorkAmount::Unit::pairs, "pairs of slice and receiver"},
+            {"technique.resolution", textures * settings.resolution * settings.resolution, WorkAmount::Unit::slice_texels,
+             "texels of slices"}};
+}
+
+std::vector<opencl::Specialisation> specialisations(const OcclusionTexture& settings, int lanes)
+{
+    std::vector<opencl::Specialisation> programs;
+    for (const bool directional : {false, true}) programs.push_back(program(lanes, level_kind(directional, settings), settings));
+    return programs;
+}
+
+DeviceBuffers device_buffers(const OcclusionTexture&)
+{
+    return {.prepare = Error(ErrorCode::unsupported,
+                             "occlusion_texture makes surfaces of depth maps on the host and cannot prepare from device buffers",
+                             "prepare it from objects, or from depth maps in memory"),
+            .shade = {}};
 }
 
 } // namespace penumbra

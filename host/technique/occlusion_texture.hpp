@@ -7,7 +7,8 @@
 #include "scene/camera.hpp"
 #include "technique/receiver_points.hpp"
 #include "technique/slice_fit.hpp"
-#include "technique/soft_shadow_map.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -40,5 +41,14 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
 // Writes visibility, receivers.view.height x receivers.view.width. `counts`, if any, takes the lookups as pairs.
 void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture& prepared, const ReceiverPoints& receivers,
                              const cl::Buffer& visibility, ShadeCounts* counts);
+
+// The verbs (verbs.hpp).
+TechniqueRow row(const OcclusionTexture&);
+Needs needs(const OcclusionTexture&);
+PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, const OcclusionTexture& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedOcclusionTexture& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const OcclusionTexture& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const OcclusionTexture& settings, int lanes);
+DeviceBuffers device_buffers(const OcclusionTexture& settings);
 
 } // namespace penumbra

@@ -1,11 +1,12 @@
 #include "technique/ray_traced.hpp"
 
+#include <penumbra/error.hpp>
+
 #include "technique/keys.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
 
-TechniqueRow ray_traced_row()
+TechniqueRow row(const RayTraced&)
 {
     using S = RayTraced;
     return {.kind = "ray_traced",
@@ -19,16 +20,52 @@ TechniqueRow ray_traced_row()
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = true,
             .inputs = "objects that cast; receiver depth (or objects that receive)",
+            .on_host = true,
             .defaults = RayTraced{}};
 }
 
-VisibilityResult shade_rays(const PreparedRays& prepared, const DepthMap& receivers, const Camera& camera)
+Needs needs(const RayTraced&) { return {.casters = Needs::Casters::required}; }
+
+PreparedRays prepare(opencl::Work& work, const Casting& casting, const RayTraced& settings, Findings& findings)
 {
-    return trace_visibility(*prepared.casters, prepared.light, receivers, camera,
-                            {.samples = prepared.settings.samples,
-                             .adaptive = prepared.settings.adaptive,
-                             .first_samples = prepared.settings.first_samples,
-                             .seed = static_cast<std::uint64_t>(prepared.settings.seed)});
+    work.stage("prepare");
+    PreparedRays prepared{.settings = settings, .light = casting.light, .casters = casting.tracer()};
+    work.moved(prepared.casters->bytes());
+    if (prepared.casters->degenerate_count() > 0)
+        findings.warnings.push_back(std::to_string(prepared.casters->degenerate_count()) + " triangles without area were left out");
+    return prepared;
+}
+
+void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    work.stage("shade");
+    VisibilityResult result = trace_visibility(*prepared.casters, prepared.light, *receivers.depth, receivers.camera,
+                                               {.samples = prepared.settings.samples,
+                                                .adaptive = prepared.settings.adaptive,
+                                                .first_samples = prepared.settings.first_samples,
+                                                .seed = static_cast<std::uint64_t>(prepared.settings.seed)});
+    shaded.image = std::move(result.visibility);
+    if (shaded.counts) shaded.counts->pairs = result.rays;
+}
+
+std::vector<WorkAmount> work(const RayTraced& settings, const MaskShape& shape)
+{
+    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples, WorkAmount::Unit::rays, "rays"}};
+}
+
+std::vector<opencl::Specialisation> specialisations(const RayTraced&, int) { return {}; }
+
+DeviceBuffers device_buffers(const RayTraced&)
+{
+    return {.prepare = Error(ErrorCode::usage, "ray_traced needs objects", "prepare it from a scene"),
+            .shade = Error(ErrorCode::unsupported, "ray_traced runs on the host and cannot shade device buffers",
+                           "shade a depth map in memory")};
+}
+
+PreparedRays with_emission(opencl::Work& work, const PreparedRays& prepared, const Light& light)
+{
+    work.stage("prepare");
+    return {.settings = prepared.settings, .light = light, .casters = prepared.casters};
 }
 
 } // namespace penumbra

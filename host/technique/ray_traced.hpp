@@ -5,7 +5,8 @@
 
 #include <penumbra/technique.hpp>
 
-#include "trace/tracer.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -15,6 +16,14 @@ struct PreparedRays {
     std::shared_ptr<const Tracer> casters;
 };
 
-VisibilityResult shade_rays(const PreparedRays& prepared, const DepthMap& receivers, const Camera& camera);
+// The verbs (verbs.hpp).
+TechniqueRow row(const RayTraced&);
+Needs needs(const RayTraced&);
+PreparedRays prepare(opencl::Work& work, const Casting& casting, const RayTraced& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const RayTraced& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const RayTraced& settings, int lanes);
+DeviceBuffers device_buffers(const RayTraced& settings);
+PreparedRays with_emission(opencl::Work& work, const PreparedRays& prepared, const Light& light);
 
 } // namespace penumbra

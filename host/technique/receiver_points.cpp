@@ -7,6 +7,8 @@ int padded(int size, int multiple) { return (size + multiple - 1) / multiple * m
 
 } // namespace
 
+opencl::Specialisation receivers_program() { return {"receivers.cl", {{"TILE_ROWS", std::to_string(tile_rows)}}}; }
+
 ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view)
 {
     ReceiverView view{};

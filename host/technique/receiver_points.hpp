@@ -5,9 +5,15 @@
 
 #include "common/shared.h"
 #include "opencl/work.hpp"
-#include "technique/constants.hpp"
 
 namespace penumbra {
+
+// Rows of a tile of receivers (see soft_shadow_map.cl; the width is TILE_WIDTH of common/shared.h).
+constexpr int tile_rows = 8;
+
+// The program of receivers.cl by itself. A technique's kernel file includes it and occluders.cl, and the technique launches all it needs from
+// its own program: drivers take tens of milliseconds a program even from their caches.
+opencl::Specialisation receivers_program();
 
 // Padded lists, `view.rows` x `view.stride`.
 struct ReceiverPoints {
@@ -21,6 +27,6 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
 
 // Launches receivers_from_depth on a depth map that is on the device. `program`: one that has the kernel.
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
-                               const opencl::Specialisation& program = ReceiversConstants{}.specialisation());
+                               const opencl::Specialisation& program = receivers_program());
 
 } // namespace penumbra

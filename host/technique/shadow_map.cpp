@@ -1,20 +1,31 @@
 #include "technique/shadow_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 
-#include "technique/constants.hpp"
 #include "technique/keys.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
+namespace {
 
-TechniqueRow shadow_map_row()
+constexpr Names<3> filter_names{"hard", "percentage_closer", "bicubic"};
+
+opencl::Specialisation program() { return {"shadow_map.cl", {{"TILE_ROWS", std::to_string(tile_rows)}}}; }
+
+bool is_empty(const DepthMap& map)
+{
+    return std::none_of(map.depth.begin(), map.depth.end(), [](float depth) { return depth > 0 && std::isfinite(depth); });
+}
+
+} // namespace
+
+TechniqueRow row(const ShadowMap&)
 {
     using S = ShadowMap;
     return {.kind = "shadow_map",
             .summary = "Hard shadows from the light's centre, plain or with filtered edges; the light's extent is ignored.",
             .source = "Williams 1978; percentage-closer filtering: Reeves, Salesin, Cook 1987",
-            .keys = {choice_key<S>("filter", &S::filter, {"hard", "percentage_closer", "bicubic"},
+            .keys = {choice_key<S>("filter", &S::filter, filter_names,
                                    "one comparison, taps x taps equal ones, or 4 x 4 with cubic B-spline weights"),
                      integer_key<S>("taps", &S::taps, {1, 63}, "texels", "side of percentage_closer's window"),
                      real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
@@ -28,12 +39,11 @@ TechniqueRow shadow_map_row()
 PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& depth, const ShadowMap& settings)
 {
     const MapSize size{depth.width, depth.height};
-    const opencl::Specialisation program = ShadowMapConstants{}.specialisation();
     return {.settings = settings,
-            .program = program,
+            .program = program(),
             .view = occluder_view(depth, size),
             .precision = depth.precision,
-            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program)};
+            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program())};
 }
 
 void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility)
@@ -53,5 +63,36 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
     work.launch(program, "shadow_map_taps", grid, {16, 8}, bytes, view, prepared.view, bias, precision, taps, prepared.map.texels,
                 prepared.map.steps, receivers.xi, receivers.eta, receivers.d, visibility);
 }
+
+Needs needs(const ShadowMap&) { return {.front = true}; }
+
+PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const ShadowMap& settings, Findings& findings)
+{
+    if (const LightFrame frame = light_frame(casting.light); frame.half_u > 0 || frame.half_v > 0)
+        findings.warnings.push_back("shadow_map takes the light as a point at its centre: its extent is ignored");
+    if (casting.depth.front && is_empty(*casting.depth.front)) findings.warnings.emplace_back(empty_map);
+    findings.view = casting.depth.camera;
+    const DeviceDepth maps = on_device(work, casting, true, false);
+    work.stage("prepare");
+    return prepare_shadow_map(work, maps.depth, settings);
+}
+
+void shade(opencl::Work& work, const PreparedShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("shade");
+    shade_shadow_map(work, prepared, points, shaded.visibility);
+}
+
+std::vector<WorkAmount> work(const ShadowMap& settings, const MaskShape& shape)
+{
+    const int side = settings.filter == ShadowFilter::percentage_closer ? settings.taps : settings.filter == ShadowFilter::bicubic ? 4 : 1;
+    return {{"receivers.resolution", shape.lights() * shape.pixels() * side * side, WorkAmount::Unit::pairs,
+             "pairs of occluder texel and receiver"}};
+}
+
+std::vector<opencl::Specialisation> specialisations(const ShadowMap&, int) { return {program()}; }
+
+DeviceBuffers device_buffers(const ShadowMap&) { return {}; }
 
 } // namespace penumbra

@@ -3,6 +3,8 @@
 
 #include "technique/occluder_maps.hpp"
 #include "technique/receiver_points.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -18,5 +20,14 @@ PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& de
 
 // Writes visibility, receivers.view.height x receivers.view.width.
 void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility);
+
+// The verbs (verbs.hpp).
+TechniqueRow row(const ShadowMap&);
+Needs needs(const ShadowMap&);
+PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const ShadowMap& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedShadowMap& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const ShadowMap& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const ShadowMap& settings, int lanes);
+DeviceBuffers device_buffers(const ShadowMap& settings);
 
 } // namespace penumbra

@@ -7,15 +7,22 @@
 
 #include <penumbra/error.hpp>
 
-#include "technique/constants.hpp"
 #include "technique/keys.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
 namespace {
 
 constexpr std::size_t group_size = SMOOTHIE_GROUP;
 constexpr int spreads = 3; // texels that receivers are spread over where none is seen
+
+constexpr Names<2> t_from_names{"light", "t"};
+constexpr Names<2> silhouettes_names{"object", "image"};
+constexpr Names<2> falloff_names{"sinusoidal", "linear"};
+
+opencl::Specialisation program(int lanes)
+{
+    return {"smoothie.cl", {{"LANES", std::to_string(lanes)}, {"TILE_ROWS", std::to_string(tile_rows)}}};
+}
 
 // A point of the light's image: tangents (orthographic: lengths), and disparity.
 struct Point {
@@ -120,21 +127,39 @@ ReceiverDepths receiver_depths(opencl::Work& work, const PreparedSmoothie& prepa
     return depths;
 }
 
+// The light's centre; of a directional light a point so far against its direction that its rays are parallel to a ten-thousandth.
+Vec3 viewpoint(const LightFrame& frame, const Camera& camera, const Topology& topology)
+{
+    if (!frame.directional) return frame.origin;
+    double reach = 0;
+    for (const Imath::V3f& vertex : topology.vertices()) reach = std::max(reach, (Vec3(vertex) - camera.frame.origin).length());
+    return camera.frame.origin - frame.direction * (1e4 * reach);
+}
+
+// Of the objects that cast, or of the surfaces that the map shows.
+std::shared_ptr<const Topology> topology_of(const Casting& casting, const Smoothie& settings)
+{
+    if (!casting.meshes.empty() && settings.silhouettes == SilhouetteSource::object) return casting.topology();
+    const TriangleMesh surfaces = mesh_of_texels(*casting.depth.front, casting.depth.camera);
+    const TriangleMesh* const meshes[] = {&surfaces};
+    return std::make_shared<const Topology>(meshes);
+}
+
 } // namespace
 
-TechniqueRow smoothie_row()
+TechniqueRow row(const Smoothie&)
 {
     using S = Smoothie;
     return {.kind = "smoothie",
             .summary = "A shadow map with fins at its silhouettes: soft edges that harden at contact, for little more than the map; the "
                        "umbra stays whole.",
             .source = "Chan, Durand: Rendering Fake Soft Shadows with Smoothies, Eurographics Symposium on Rendering 2003",
-            .keys = {choice_key<S>("t_from", &S::t_from, {"light", "t"},
+            .keys = {choice_key<S>("t_from", &S::t_from, t_from_names,
                                    "how wide smoothies are: as half of what the light's size casts, or t"),
                      real_key<S>("t", &S::t, {0, 2}, "half widths of the light's image", "the paper's t; with t_from t"),
-                     choice_key<S>("silhouettes", &S::silhouettes, {"object", "image"},
+                     choice_key<S>("silhouettes", &S::silhouettes, silhouettes_names,
                                    "edges of the objects that cast, or of the depth map; without objects: of the map"),
-                     choice_key<S>("falloff", &S::falloff, {"sinusoidal", "linear"}, "of visibility across a smoothie"),
+                     choice_key<S>("falloff", &S::falloff, falloff_names, "of visibility across a smoothie"),
                      flag_key<S>("two_sided", &S::two_sided,
                                  "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks"),
                      real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
@@ -193,13 +218,13 @@ PreparedSmoothie prepare_smoothie(opencl::Work& work, const OccluderDepth& depth
 {
     check_settings(settings);
     const MapSize size{depth.width, depth.height};
-    const opencl::Specialisation program = SmoothieConstants{.lanes = work.context().quirks().lanes}.specialisation();
+    const opencl::Specialisation built = program(work.context().quirks().lanes);
     return {.settings = settings,
-            .program = program,
+            .program = built,
             .occluders = occluder_view(depth, size),
             .view = view_of(depth, edges, settings),
             .precision = depth.precision,
-            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program),
+            .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, built),
             .boxes = work.upload(std::span<const float>(edges.boxes), "boxes of silhouettes"),
             .edge_boxes = work.upload(std::span<const float>(edges.edge_boxes), "boxes of silhouette edges"),
             .edges = work.upload(std::span<const float>(edges.edges), "silhouette edges")};
@@ -223,6 +248,55 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),
                 prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
                 receivers.d, visibility);
+}
+
+Needs needs(const Smoothie&) { return {.front = true}; }
+
+PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoothie& settings, Findings& findings)
+{
+    const LightDepth& maps = casting.depth;
+    findings.view = maps.camera;
+
+    work.stage("topology");
+    if (casting.meshes.empty() && settings.silhouettes == SilhouetteSource::object)
+        findings.warnings.emplace_back("there are no objects that cast: silhouettes are those of the depth map (silhouettes image)");
+    const std::shared_ptr<const Topology> topology = topology_of(casting, settings);
+    work.moved(topology->bytes());
+
+    work.stage("silhouettes");
+    const Silhouette silhouette = silhouette_of(*topology, viewpoint(light_frame(casting.light), maps.camera, *topology));
+    const SmoothieEdges edges = smoothie_edges(*topology, silhouette, maps.camera);
+    work.moved(edges.edges.size() * sizeof(float));
+    findings.notes.push_back(std::to_string(edges.count) + " silhouette edges wear smoothies");
+    if (edges.count == 0) findings.warnings.emplace_back("there are no silhouettes before the light: shadows have hard edges");
+
+    const DeviceDepth uploaded = on_device(work, casting, true, false);
+    work.stage("shadow map");
+    return prepare_smoothie(work, uploaded.depth, edges, settings);
+}
+
+void shade(opencl::Work& work, const PreparedSmoothie& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("shade");
+    shade_smoothie(work, prepared, points, shaded.visibility);
+}
+
+std::vector<WorkAmount> work(const Smoothie&, const MaskShape& shape)
+{
+    // Each texel of a map is searched for fins; the edges that it meets are known when silhouettes are.
+    double texels = 0;
+    for (const MaskShape::Map& map : shape.occluders) texels += static_cast<double>(map.width) * map.height;
+    return {{"occluders.resolution", texels, WorkAmount::Unit::pairs, "pairs of texel and edge, at one edge a texel"}};
+}
+
+std::vector<opencl::Specialisation> specialisations(const Smoothie&, int lanes) { return {program(lanes)}; }
+
+DeviceBuffers device_buffers(const Smoothie&)
+{
+    return {.prepare = Error(ErrorCode::unsupported, "smoothie finds silhouettes on the host and cannot prepare from device buffers",
+                             "prepare it from objects, or from depth maps in memory"),
+            .shade = {}};
 }
 
 } // namespace penumbra

@@ -6,6 +6,8 @@
 #include "silhouette/silhouette.hpp"
 #include "technique/occluder_maps.hpp"
 #include "technique/receiver_points.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -37,5 +39,14 @@ PreparedSmoothie prepare_smoothie(opencl::Work& work, const OccluderDepth& depth
 
 // Writes visibility, receivers.view.height x receivers.view.width.
 void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility);
+
+// The verbs (verbs.hpp).
+TechniqueRow row(const Smoothie&);
+Needs needs(const Smoothie&);
+PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoothie& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedSmoothie& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const Smoothie& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const Smoothie& settings, int lanes);
+DeviceBuffers device_buffers(const Smoothie& settings);
 
 } // namespace penumbra

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 
-#include "technique/constants.hpp"
+#include <penumbra/error.hpp>
+
 #include "technique/keys.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr Names<3> sides_names{"front", "back", "both"};
+constexpr Names<2> reduction_names{"area", "nearest"};
+constexpr Names<3> accumulator_names{"binary32", "compensated", "binary16"};
 
 MapSize blocks_of(MapSize size) { return {(size.width + BLOCK - 1) / BLOCK, (size.height + BLOCK - 1) / BLOCK}; }
 
@@ -30,10 +34,17 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
     return side;
 }
 
-SoftShadowMapConstants constants_of(const opencl::Context& context, const SoftShadowMap& settings)
+// Rows of a tile that one work-item owns: all of them, or on devices that vectorise by themselves one.
+int item_rows(int lanes) { return lanes == 1 ? 1 : tile_rows; }
+
+// The program with every kernel that the technique launches.
+opencl::Specialisation program(const SoftShadowMap& settings, int lanes)
 {
-    const int lanes = context.quirks().lanes;
-    return {.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = static_cast<int>(settings.accumulator)};
+    return {"soft_shadow_map.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"ITEM_ROWS", std::to_string(item_rows(lanes))},
+             {"TILE_ROWS", std::to_string(tile_rows)},
+             choice_constant("ACCUMULATOR", accumulator_names, settings.accumulator)}};
 }
 
 // One pass over the receivers for one occluder map.
@@ -41,13 +52,13 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
                 const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility,
                 const opencl::Buffer<cl_uint>& evaluated)
 {
-    const SoftShadowMapConstants constants = constants_of(work.context(), prepared.settings);
+    const int device_lanes = work.context().quirks().lanes;
     const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
 
     // On a GPU a tile is a work-group; on a CPU device a work-item, and groups of one keep the share of each thread fine.
-    const auto lanes = static_cast<std::size_t>(constants.lanes), rows = static_cast<std::size_t>(constants.item_rows);
+    const auto lanes = static_cast<std::size_t>(device_lanes), rows = static_cast<std::size_t>(item_rows(device_lanes));
     const std::array<std::size_t, 2> group =
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
     const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
@@ -56,21 +67,35 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
                 side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, visibility, evaluated);
 }
 
+// Shades what the light sees of the receivers, and samples that mask from the receivers' camera (3.1).
+void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    const int side = prepared.settings.project_resolution;
+    const DepthMap from_light = receivers.from_light(side);
+    const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program);
+    const auto light_mask = work.buffer<float>(from_light.depth.size(), "light-space mask");
+    work.stage("shade");
+    shade_soft_shadow_map(work, prepared, lit_points, light_mask.memory(), shaded.counts);
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("project");
+    sample_mask(work, points, light_mask.memory(), side, side, shaded.visibility, prepared.program);
+}
+
 } // namespace
 
-TechniqueRow soft_shadow_map_row()
+TechniqueRow row(const SoftShadowMap&)
 {
     using S = SoftShadowMap;
     return {.kind = "soft_shadow_map",
             .summary = "Micro-patches: every texel of the occluder map is projected back onto the light and its share is summed.",
             .source = "Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion: Soft Shadow Maps, 2006",
-            .keys = {choice_key<S>("sides", &S::sides, {"front", "back", "both"},
+            .keys = {choice_key<S>("sides", &S::sides, sides_names,
                                    "which occluder maps are used; both merges them by the larger occlusion"),
                      integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
                                     "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
-                     choice_key<S>("reduction", &S::reduction, {"area", "nearest"},
+                     choice_key<S>("reduction", &S::reduction, reduction_names,
                                    "how a larger map becomes `resolution`: by covered area, or by the texel at the centre"),
-                     choice_key<S>("accumulator", &S::accumulator, {"binary32", "compensated", "binary16"},
+                     choice_key<S>("accumulator", &S::accumulator, accumulator_names,
                                    "how shares are summed; binary16 is the 2006 hardware's blending, for study"),
                      real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
                                  "self-shadow bound of receivers on the casters' own surface; 1 is the bound, 0 none"),
@@ -84,17 +109,12 @@ TechniqueRow soft_shadow_map_row()
             .defaults = SoftShadowMap{}};
 }
 
-opencl::Specialisation program_of(const opencl::Context& context, const SoftShadowMap& settings)
-{
-    return constants_of(context, settings).specialisation();
-}
-
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
 {
     const MapSize from{depth.width, depth.height};
     const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
     PreparedSoftShadowMap prepared{.settings = settings,
-                                   .program = program_of(work.context(), settings),
+                                   .program = program(settings, work.context().quirks().lanes),
                                    .view = occluder_view(depth, size),
                                    .precision = depth.precision,
                                    .nearest = 0,
@@ -136,6 +156,61 @@ void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::
     const auto width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height);
     work.launch(program, "sample_mask", {width, height}, {16, 8}, width * height * 20, view, receivers.xi, receivers.eta, receivers.d,
                 cl_int2{{mask_width, mask_height}}, mask, visibility);
+}
+
+Needs needs(const SoftShadowMap& settings)
+{
+    return {.front = settings.sides != Sides::back, .back = settings.sides != Sides::front, .receivers_from_light = settings.project};
+}
+
+PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings)
+{
+    const Needs wanted = needs(settings);
+    findings.view = casting.depth.camera;
+    const DeviceDepth maps = on_device(work, casting, wanted.front, wanted.back);
+    work.stage("prepare");
+    PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, maps.depth, settings);
+    if (prepared.nearest == 0) findings.warnings.emplace_back(empty_map);
+    return prepared;
+}
+
+void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    if (prepared.settings.project) {
+        shade_projected(work, prepared, receivers, shaded);
+        return;
+    }
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("shade");
+    shade_soft_shadow_map(work, prepared, points, shaded.visibility, shaded.counts);
+}
+
+std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& shape)
+{
+    double texels = 0;
+    for (const MaskShape::Map& given : shape.occluders) {
+        const MapSize map = reduced_size(given.width, given.height, settings.resolution);
+        texels += static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
+    }
+    std::vector<WorkAmount> amounts;
+    double points = shape.pixels();
+    if (settings.project) {
+        points = static_cast<double>(settings.project_resolution) * settings.project_resolution;
+        amounts.push_back({"technique.project_resolution", points, WorkAmount::Unit::receivers, "pixels"});
+    }
+    amounts.push_back({"receivers.resolution", texels * points, WorkAmount::Unit::pairs, "pairs of occluder texel and receiver"});
+    return amounts;
+}
+
+std::vector<opencl::Specialisation> specialisations(const SoftShadowMap& settings, int lanes) { return {program(settings, lanes)}; }
+
+DeviceBuffers device_buffers(const SoftShadowMap& settings)
+{
+    if (!settings.project) return {};
+    return {.prepare = {},
+            .shade = Error(ErrorCode::unsupported,
+                           "project renders the receivers from the light on the host and cannot shade device buffers",
+                           "set project to false")};
 }
 
 } // namespace penumbra

@@ -5,6 +5,8 @@
 
 #include "technique/occluder_maps.hpp"
 #include "technique/receiver_points.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 
 namespace penumbra {
 
@@ -22,16 +24,6 @@ struct PreparedSoftShadowMap {
     std::vector<Side> sides;
 };
 
-// What shading counted. Zero where the work is only queued.
-struct ShadeCounts {
-    std::uint64_t pairs = 0;               // (texel, receiver) pairs evaluated
-    std::uint64_t receivers = 0;           // that are there
-    std::uint64_t uncovered_receivers = 0; // that see part of the light past the occluder map's border
-};
-
-// The program with every kernel that the technique launches on this device.
-opencl::Specialisation program_of(const opencl::Context& context, const SoftShadowMap& settings);
-
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings);
 
 // Writes visibility, receivers.view.height x receivers.view.width. With `counts` it waits for the device to fill them in.
@@ -40,6 +32,15 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
 
 // A mask of the light's view, sampled at receivers of another camera (the `project` setting).
 void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::Buffer& mask, int mask_width, int mask_height,
-                 const cl::Buffer& visibility, const opencl::Specialisation& program = ReceiversConstants{}.specialisation());
+                 const cl::Buffer& visibility, const opencl::Specialisation& program = receivers_program());
+
+// The verbs (verbs.hpp).
+TechniqueRow row(const SoftShadowMap&);
+Needs needs(const SoftShadowMap& settings);
+PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const SoftShadowMap& settings, int lanes);
+DeviceBuffers device_buffers(const SoftShadowMap& settings);
 
 } // namespace penumbra

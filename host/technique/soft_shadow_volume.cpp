@@ -6,14 +6,22 @@
 #include <penumbra/error.hpp>
 
 #include "scene/parallel.hpp"
-#include "technique/constants.hpp"
 #include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
 #include "technique/linear_wedges.hpp"
-#include "technique/rows.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr Names<3> coverage_names{"linear", "analytic", "texture"};
+constexpr Names<4> overlap_names{"sum", "max", "half_min", "product"};
+constexpr Names<3> lookup_names{"nearest", "bilinear", "quadrilinear"};
+constexpr Names<4> buffer_names{"binary32", "int16", "six_bits", "twelve_bits"};
+constexpr Names<4> culling_names{"none", "loose", "far_depth", "tight"};
+constexpr Names<2> shape_names{"rectangle", "disc"}; // of LightShape
+
+static_assert(static_cast<int>(Overlap::sum) == OVERLAP_SUM && static_cast<int>(Overlap::max) == OVERLAP_MAX);
+static_assert(static_cast<int>(Overlap::half_min) == OVERLAP_HALF_MIN && static_cast<int>(Overlap::product) == OVERLAP_PRODUCT);
 
 const Image* emission_of(const Light& light)
 {
@@ -38,17 +46,28 @@ void check_settings(const Light& light, const SoftShadowVolume& settings)
         throw Error(ErrorCode::invalid_input, "light.emission: needs coverage texture", "set technique.coverage to \"texture\"");
 }
 
-SoftShadowVolumeConstants constants_of(const opencl::Context& context, const LightFrame& light, const SoftShadowVolume& settings,
-                                       int channels)
+int item_rows(int lanes) { return lanes == 1 ? 1 : tile_rows; }
+
+// Linear coverage takes every light for a sphere; only a table is looked up.
+opencl::Specialisation program(int lanes, LightShape light, const SoftShadowVolume& settings, int channels)
 {
-    const int lanes = context.quirks().lanes;
-    return {.lanes = lanes,
-            .item_rows = lanes == 1 ? 1 : tile_rows,
-            .light = light.shape == LightShape::disc && settings.coverage != Coverage::linear ? 1 : 0,
-            .coverage = static_cast<int>(settings.coverage),
-            .channels = channels,
-            .lookup = settings.coverage == Coverage::texture ? static_cast<int>(settings.lookup) : 2,
-            .accumulator = static_cast<int>(settings.buffer)};
+    const bool table = settings.coverage == Coverage::texture;
+    return {"soft_shadow_volume.cl",
+            {{"LANES", std::to_string(lanes)},
+             {"ITEM_ROWS", std::to_string(item_rows(lanes))},
+             {"TILE_ROWS", std::to_string(tile_rows)},
+             choice_constant("LIGHT", shape_names, settings.coverage == Coverage::linear ? LightShape::rectangle : light),
+             choice_constant("COVERAGE", coverage_names, settings.coverage),
+             {"CHANNELS", std::to_string(channels)},
+             choice_constant("LOOKUP", lookup_names, table ? settings.lookup : Lookup::quadrilinear),
+             choice_constant("ACCUMULATOR", buffer_names, settings.buffer)}};
+}
+
+// What the kernel culls by. Depth ranges are the host's affair.
+int kernel_culling(WedgeCulling culling)
+{
+    if (culling == WedgeCulling::none) return CULLING_NONE;
+    return culling == WedgeCulling::loose ? CULLING_LOOSE : CULLING_TIGHT;
 }
 
 WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Casters& casters, const SoftShadowVolume& settings, int sheets)
@@ -72,9 +91,7 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
             .share = {static_cast<float>(part.share), static_cast<float>(part.share), static_cast<float>(part.share)},
             .sheets = sheets,
             .overlap = static_cast<int>(settings.overlap),
-            .culling = settings.culling == WedgeCulling::none    ? 0
-                       : settings.culling == WedgeCulling::loose ? 1
-                                                                 : 2,
+            .culling = kernel_culling(settings.culling),
             .first = 0};
 }
 
@@ -160,7 +177,7 @@ void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolu
     const EmissionSums emission = emission_sums(emission_of(light), 2 * table);
     const EmissionPart whole = emission_part(emission, parts_of(frame, 1).front(), 1);
     prepared.channels = emission.channels;
-    prepared.program = constants_of(work.context(), frame, prepared.settings, emission.channels).specialisation();
+    prepared.program = program(work.context().quirks().lanes, frame.shape, prepared.settings, emission.channels);
     const std::vector<LightPart> parts = parts_of(frame, splits);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const EmissionPart lit = emission_part(emission, parts[i], splits);
@@ -180,9 +197,32 @@ cl_float4 eye_of(const ReceiverView& view, const WedgeLight& light, bool wanted)
     return {{x / z * light.scale_x - light.centre_x * d, y / z * light.scale_y - light.centre_y * d, d, 1}};
 }
 
+// Surfaces that the occluder maps show, where there are no objects: every map's sheets of texels.
+Topology topology_of_maps(const LightDepth& maps)
+{
+    std::vector<TriangleMesh> meshes{mesh_of_texels(*maps.front, maps.camera)};
+    for (const DepthMap& layer : maps.layers) meshes.push_back(mesh_of_texels(layer, maps.camera));
+    std::vector<const TriangleMesh*> pointers;
+    for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
+    return Topology(pointers);
+}
+
+void warn_of_edges(const Topology& topology, std::vector<std::string>& warnings)
+{
+    const auto warn = [&](std::uint64_t count, const char* what) {
+        if (count > 0) warnings.push_back(std::to_string(count) + what);
+    };
+    warn(topology.open_edges(),
+         " edges of the casters have one triangle alone: they count as silhouettes, and both sides of such a surface cast "
+         "(overlap sum: of the two the one that hides more counts)");
+    warn(topology.nonmanifold_edges(),
+         " edges of the casters have more than two triangles: they count as silhouettes where the facing ones do not cancel");
+    warn(topology.left_out(), " triangles without area were left out");
+}
+
 } // namespace
 
-TechniqueRow soft_shadow_volume_row()
+TechniqueRow row(const SoftShadowVolume&)
 {
     using S = SoftShadowVolume;
     return {
@@ -190,21 +230,21 @@ TechniqueRow soft_shadow_volume_row()
         .summary =
             "Penumbra wedges: the hard shadow of the light's centre, corrected around each silhouette edge. Exact for planar casters.",
         .source = "Assarsson: A Real-Time Soft Shadow Volume Algorithm, 2003 (Papers I to V)",
-        .keys = {choice_key<S>("coverage", &S::coverage, {"linear", "analytic", "texture"},
+        .keys = {choice_key<S>("coverage", &S::coverage, coverage_names,
                                "an edge's share of the light: Paper I's wedge, the closed form, or a table, which textured lights need"),
                  flag_key<S>("smooth", &S::smooth, "linear: light intensity s becomes 3 s^2 - 2 s^3"),
                  integer_key<S>("corner_wedges", &S::corner_wedges, {0, 16}, "wedges",
                                 "linear: extra wedges at a corner of 0 degrees; fewer up to a right angle, where there are none"),
-                 choice_key<S>("overlap", &S::overlap, {"sum", "max", "half_min", "product"},
+                 choice_key<S>("overlap", &S::overlap, overlap_names,
                                "how sheets of triangles that hide the same light are joined; half_min is Paper IV's Eq. 1"),
                  integer_key<S>("light_splits", &S::light_splits, {1, 16}, "parts",
                                 "n x n parts of a rectangle, each with silhouettes of its own: nearer to the truth, n x n preparations"),
                  integer_key<S>("table", &S::table, {4, 64}, "places", "texture: places an axis of the coverage table, an even number"),
-                 choice_key<S>("lookup", &S::lookup, {"nearest", "bilinear", "quadrilinear"},
+                 choice_key<S>("lookup", &S::lookup, lookup_names,
                                "texture: between the table's places; bilinear is so in one end of the edge, quadrilinear in both"),
-                 choice_key<S>("buffer", &S::buffer, {"binary32", "int16", "six_bits", "twelve_bits"},
+                 choice_key<S>("buffer", &S::buffer, buffer_names,
                                "what shares are added in; all but binary32 are the papers' integer buffers, for study"),
-                 choice_key<S>("culling", &S::culling, {"none", "loose", "far_depth", "tight"},
+                 choice_key<S>("culling", &S::culling, culling_names,
                                "which wedges a tile of receivers looks at, for study: the mask is the same"),
                  real_key<S>("bias", &S::bias, {0, 16}, "half texels",
                              "of casters made from depth maps: how far along their slope they count as the receiver's own surface")},
@@ -229,7 +269,7 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     const int splits = extent ? settings.light_splits : 1;
     PreparedSoftShadowVolume prepared{.settings = settings,
                                       .channels = 1,
-                                      .program = constants_of(work.context(), frame, settings, 1).specialisation(),
+                                      .program = program(work.context().quirks().lanes, frame.shape, settings, 1),
                                       .parts = {},
                                       .edges = 0,
                                       .triangles = 0,
@@ -268,9 +308,10 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     return prepared;
 }
 
-PreparedSoftShadowVolume with_emission_of(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light)
+PreparedSoftShadowVolume with_emission(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light)
 {
     check_settings(light, prepared.settings);
+    work.stage("prepare");
     PreparedSoftShadowVolume other = prepared;
     set_emission(work, light, other);
     return other;
@@ -287,7 +328,8 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
     work.launch(prepared.program, "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, view, 0.0F, cl_float2{{0, 0}},
                 receivers.xi, receivers.eta, receivers.d, bounds);
 
-    const auto lanes = static_cast<std::size_t>(work.context().quirks().lanes), rows = lanes == 1 ? std::size_t{1} : std::size_t{tile_rows};
+    const int device_lanes = work.context().quirks().lanes;
+    const auto lanes = static_cast<std::size_t>(device_lanes), rows = static_cast<std::size_t>(item_rows(device_lanes));
     const auto width = static_cast<std::size_t>(view.stride), height = static_cast<std::size_t>(view.rows);
     const std::array<std::size_t, 2> group =
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
@@ -310,6 +352,65 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
     for (const cl_uint2& tile : work.read(evaluated)) counts->pairs += std::uint64_t{tile.s[0]} * TILE_WIDTH * tile_rows;
+}
+
+Needs needs(const SoftShadowVolume&) { return {.casters = Needs::Casters::or_front}; }
+
+PreparedSoftShadowVolume prepare(opencl::Work& work, const Casting& casting, const SoftShadowVolume& settings, Findings& findings)
+{
+    work.stage("topology");
+    std::shared_ptr<const Topology> topology;
+    Vec2 texel{0, 0};
+    if (!casting.meshes.empty()) {
+        topology = casting.topology();
+        warn_of_edges(*topology, findings.warnings);
+    } else {
+        const LightDepth& maps = casting.depth;
+        topology = std::make_shared<const Topology>(topology_of_maps(maps));
+        texel = {2 * maps.camera.half_extent.x / maps.width, 2 * maps.camera.half_extent.y / maps.height};
+    }
+    work.moved(topology->bytes());
+
+    work.stage("prepare");
+    findings.view = wedge_view(casting.light);
+    PreparedSoftShadowVolume prepared =
+        prepare_soft_shadow_volume(work, casting.light, {.topology = *topology, .texel = texel}, settings);
+    findings.channels = prepared.channels;
+    findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
+    if (prepared.triangles == 0) findings.warnings.emplace_back("no triangle faces the light: nothing casts shadows");
+    return prepared;
+}
+
+void shade(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Receiving& receivers, Shaded& shaded)
+{
+    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    work.stage("shade");
+    shade_soft_shadow_volume(work, prepared, points, shaded.visibility, shaded.counts);
+}
+
+std::vector<WorkAmount> work(const SoftShadowVolume& settings, const MaskShape& shape)
+{
+    // How many edges and triangles a receiver meets is known when silhouettes are; this many are taken for granted.
+    constexpr double met = 4096;
+    const double parts = static_cast<double>(settings.light_splits) * settings.light_splits;
+    return {{"technique.light_splits", parts * shape.lights() * shape.pixels() * met, WorkAmount::Unit::pairs,
+             "pairs of edge and receiver, at 4096 edges a receiver and part"}};
+}
+
+std::vector<opencl::Specialisation> specialisations(const SoftShadowVolume& settings, int lanes)
+{
+    // Tables are of rectangles, in one channel or three.
+    if (settings.coverage == Coverage::texture)
+        return {program(lanes, LightShape::rectangle, settings, 1), program(lanes, LightShape::rectangle, settings, 3)};
+    return {program(lanes, LightShape::rectangle, settings, 1), program(lanes, LightShape::disc, settings, 1)};
+}
+
+DeviceBuffers device_buffers(const SoftShadowVolume&)
+{
+    return {.prepare = Error(ErrorCode::unsupported,
+                             "soft_shadow_volume finds silhouettes on the host and cannot prepare from device buffers",
+                             "prepare it from objects, or from depth maps in memory"),
+            .shade = {}};
 }
 
 } // namespace penumbra

@@ -6,7 +6,8 @@
 
 #include "silhouette/silhouette.hpp"
 #include "technique/receiver_points.hpp"
-#include "technique/soft_shadow_map.hpp"
+#include "technique/table.hpp"
+#include "technique/verbs.hpp"
 #include "technique/wedge_data.hpp"
 
 namespace penumbra {
@@ -37,10 +38,6 @@ struct Casters {
 PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Light& light, const Casters& casters,
                                                     const SoftShadowVolume& settings);
 
-// The same silhouettes, on the same buffers, under the emission of `light`, which is otherwise the light that they were prepared for: what
-// depends on emission alone is computed. Has the bits of preparing anew.
-PreparedSoftShadowVolume with_emission_of(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light);
-
 // The view that receivers are to come in: of a right angle, so that xi and eta are tangents.
 Camera wedge_view(const Light& light);
 
@@ -48,5 +45,16 @@ Camera wedge_view(const Light& light);
 // in.
 void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const ReceiverPoints& receivers,
                               const cl::Buffer& visibility, ShadeCounts* counts);
+
+// The verbs (verbs.hpp).
+TechniqueRow row(const SoftShadowVolume&);
+Needs needs(const SoftShadowVolume&);
+PreparedSoftShadowVolume prepare(opencl::Work& work, const Casting& casting, const SoftShadowVolume& settings, Findings& findings);
+void shade(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Receiving& receivers, Shaded& shaded);
+std::vector<WorkAmount> work(const SoftShadowVolume& settings, const MaskShape& shape);
+std::vector<opencl::Specialisation> specialisations(const SoftShadowVolume& settings, int lanes);
+DeviceBuffers device_buffers(const SoftShadowVolume& settings);
+// Has the bits of preparing anew; silhouettes stay on the same buffers.
+PreparedSoftShadowVolume with_emission(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Light& light);
 
 } // namespace penumbra

@@ -5,7 +5,7 @@
 
 #include <penumbra/error.hpp>
 
-#include "technique/rows.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
@@ -71,12 +71,13 @@ const SettingKey& key_of(const TechniqueRow& row, const std::string& name)
                 "known keys: " + joined(row.keys, [](const SettingKey& k) { return k.name; }));
 }
 
+template <class... S> std::vector<TechniqueRow> rows_of(std::type_identity<std::variant<S...>>) { return {row(S{})...}; }
+
 } // namespace
 
 std::span<const TechniqueRow> technique_table()
 {
-    static const std::vector<TechniqueRow> table{shadow_map_row(),        soft_shadow_map_row(), soft_shadow_volume_row(),
-                                                 occlusion_texture_row(), smoothie_row(),        ray_traced_row()};
+    static const std::vector<TechniqueRow> table = rows_of(std::type_identity<Technique>{});
     return table;
 }
 

@@ -1,7 +1,7 @@
 // Prints every specialisation of every kernel file, one a line, for the build's offline compile.
 #include <iostream>
 
-#include "technique/constants.hpp"
+#include "technique/techniques.hpp"
 
 int main()
 {

@@ -53,6 +53,15 @@ typedef struct {
     float left, top, right, bottom;
 } Emission;
 
+// How sheets that hide the same light are joined, and what spares pairs.
+#define OVERLAP_SUM 0
+#define OVERLAP_MAX 1
+#define OVERLAP_HALF_MIN 2
+#define OVERLAP_PRODUCT 3
+#define CULLING_NONE 0
+#define CULLING_LOOSE 1
+#define CULLING_TIGHT 2
+
 // The light that casts them, or a part of it.
 typedef struct {
     float scale_x, scale_y, scale_d;   // from a receiver's (xi, eta, d) to tangents and disparity in the light's half extents
@@ -63,8 +72,8 @@ typedef struct {
     float position_error;              // of receivers in light space beside their own rounding, in half extents
     float share[3];                    // what the part's visibility counts for in the whole light's, for each channel
     int sheets;
-    int overlap;                       // 0 sum, 1 max, 2 half_min, 3 product
-    int culling;                       // 0 none, 1 loose, 2 tight
+    int overlap;                       // OVERLAP_...
+    int culling;                       // CULLING_...
     int first;                         // whether it is the first part: visibility is written, not added to
 } WedgeLight;
 
@@ -98,6 +107,13 @@ typedef struct {
     int offset;                   // where the level begins, in blocks of 1024 elements
 } OcclusionLevel;
 
+// How slices are combined.
+#define COMBINE_PRODUCT 0
+#define COMBINE_SUM 1
+#define COMBINE_MAX 2
+#define COMBINE_LAYERED 3
+#define COMBINE_LAYERED_MAX 4
+
 // The light that occlusion_texture shades for, or a part of it.
 typedef struct {
     float centre_x, centre_y;     // of the part, from the light's centre; scene units
@@ -107,7 +123,7 @@ typedef struct {
     int orthographic;
     int planes;
     int taps_x, taps_y;           // lookups along each axis: a rectangle's kernel of square ones
-    int combine;                  // 0 product, 1 sum, 2 max, 3 layered, 4 layered_max
+    int combine;                  // COMBINE_...
 } OcclusionLight;
 
 // Smoothies' buffers: the occluder map's texels, in tangents of the light's view (orthographic: lengths).

@@ -2,7 +2,7 @@
 #include "support/device_run.hpp"
 #include "support/maps.hpp"
 
-#include "technique/constants.hpp"
+#include "technique/occluder_maps.hpp"
 
 namespace penumbra::test {
 namespace {

@@ -4,8 +4,8 @@
 #include "support/device_run.hpp"
 #include "support/maps.hpp"
 
-#include "technique/constants.hpp"
-#include "technique/table.hpp"
+#include "opencl/kernel_files.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra::test {
 namespace {
@@ -152,25 +152,26 @@ TEST(Table, MessagesHoldTheNumbers)
     EXPECT_TRUE(holds(choice.message(), "\"pcf\"") && holds(choice.hint(), "hard, percentage_closer, bicubic")) << choice.what();
 }
 
-// What the host asks for is among what the build compiles.
-TEST(Specialisations, EveryRequestIsCompiledByTheBuild)
+TEST(Specialisations, EachOnceAndNamedByItsChoices)
 {
     std::set<std::string> built;
-    for (const auto& s : every_specialisation()) EXPECT_TRUE(built.insert(s.file + s.options()).second) << s.options() << " twice";
-    const auto expect_built = [&](const opencl::Specialisation& s) {
-        EXPECT_TRUE(built.contains(s.file + s.options())) << s.file << s.options();
-    };
-    expect_built(ReceiversConstants{}.specialisation());
-    expect_built(OccludersConstants{}.specialisation());
-    expect_built(ShadowMapConstants{}.specialisation());
-    const int lanes = device_context()->quirks().lanes;
-    for (const Accumulator accumulator : {Accumulator::binary32, Accumulator::compensated, Accumulator::binary16})
-        expect_built(
-            SoftShadowMapConstants{.lanes = lanes, .item_rows = lanes == 1 ? 1 : tile_rows, .accumulator = static_cast<int>(accumulator)}
-                .specialisation());
-    for (int prefilter = 0; prefilter < 4; ++prefilter)
-        for (int storage = 0; storage < (prefilter == 2 ? 1 : 2); ++storage)
-            expect_built(OcclusionTextureConstants{.lanes = lanes, .prefilter = prefilter, .storage = storage}.specialisation());
+    for (const auto& s : every_specialisation()) EXPECT_TRUE(built.insert(s.file + ' ' + s.options()).second) << s.options() << " twice";
+    const std::string lanes16 = "-DLANES=16 -DITEM_ROWS=8 -DTILE_ROWS=8 ";
+    EXPECT_TRUE(built.contains("soft_shadow_map.cl " + lanes16 + "-DACCUMULATOR=ACCUMULATOR_COMPENSATED"));
+    EXPECT_TRUE(built.contains("soft_shadow_volume.cl " + lanes16 +
+                               "-DLIGHT=LIGHT_RECTANGLE -DCOVERAGE=COVERAGE_TEXTURE -DCHANNELS=3 -DLOOKUP=LOOKUP_BILINEAR "
+                               "-DACCUMULATOR=ACCUMULATOR_SIX_BITS"));
+}
+
+// Every choice that a program is built with is a name of common/choices.h.
+TEST(Specialisations, ChoicesAreDefined)
+{
+    const std::string choices(opencl::kernel_file("common/choices.h"));
+    for (const auto& s : every_specialisation())
+        for (const auto& [name, value] : s.constants)
+            if (value.starts_with(name)) {
+                EXPECT_TRUE(holds(choices, "#define " + value + ' ')) << value;
+            }
 }
 
 } // namespace

@@ -1,0 +1,31 @@
+// Settings of occlusion_texture.
+#pragma once
+
+namespace penumbra {
+
+enum class Placement { uniform, reciprocal, occupied };
+enum class Prefilter { nbuffer, mipmap, summed_area };
+enum class Combine { product, sum, max, layered, layered_max };
+enum class SelfShadow { fade, own, omit };
+enum class LevelStorage { binary32, normalized16 };
+
+// Occlusion textures (Eisemann, Decoret, Occlusion Textures for Plausible Soft Shadows, 2008): the casters cut into slices parallel to the
+// light, each a picture that is prefiltered; a receiver looks each slice between it and the light up once. Cost does not depend on the
+// light's size and hardly on the casters.
+struct OcclusionTexture {
+    int slices = 16; // 3.4
+    Placement placement =
+        Placement::uniform; // of the slices along the light's axis: even in depth (3.4), in its reciprocal, or in the casters' area
+    int resolution = 256;   // texels along each side of a slice
+    Prefilter prefilter = Prefilter::nbuffer;          // 3.2
+    LevelStorage storage = LevelStorage::normalized16; // of N-buffers and mip-maps
+    Combine combine =
+        Combine::product;  // of slices (3.3, Eq. 5); layered: the sum within each depth layer, the product or the greatest across them
+    int layers = 4;        // layered: depth layers, the last of which takes all that lies behind
+    bool leak_fix = false; // each slice is seen in the next one away from the light too (3.4.1)
+    SelfShadow self_shadow =
+        SelfShadow::fade; // 3.4.2: fade: a receiver's own slice is left out and the one before fades in with the distance from it
+    int light_splits = 1; // n x n parts of a rectangle, each with slices of its own
+};
+
+} // namespace penumbra

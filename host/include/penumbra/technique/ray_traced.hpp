@@ -1,0 +1,16 @@
+// Settings of ray_traced.
+#pragma once
+
+#include <cstdint>
+
+namespace penumbra {
+
+// Shadow rays (Embree) through the scene's objects: the reference. Stratified over the light and seeded.
+struct RayTraced {
+    int samples = 256;     // rays a receiver
+    bool adaptive = false; // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
+    int first_samples = 16;
+    std::int64_t seed = 1;
+};
+
+} // namespace penumbra

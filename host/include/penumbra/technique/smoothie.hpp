@@ -1,0 +1,23 @@
+// Settings of smoothie.
+#pragma once
+
+namespace penumbra {
+
+enum class SmoothieWidth { light, t };
+enum class SilhouetteSource { object, image };
+enum class Falloff { sinusoidal, linear };
+
+// Smoothies (Chan, Durand, Rendering Fake Soft Shadows with Smoothies, 2003): a shadow map whose silhouettes wear fins that fade to light
+// outwards.
+struct Smoothie {
+    SmoothieWidth t_from =
+        SmoothieWidth::light; // light: a smoothie is as wide as the outer half of the penumbra that the light's size casts
+    double t = 0.05;          // t_from t: the paper's t, where the light's image is 2 wide along its wider side
+    SilhouetteSource silhouettes =
+        SilhouetteSource::object;          // of the objects that cast (section 3), or of the depth map (the authors' wish, section 6)
+    Falloff falloff = Falloff::sinusoidal; // 3.1
+    bool two_sided = false;                // beyond the paper: an inner fin too, half lit at the silhouette
+    double bias = 1.0;                     // as of ShadowMap
+};
+
+} // namespace penumbra

@@ -1,0 +1,22 @@
+// Settings of soft_shadow_map.
+#pragma once
+
+namespace penumbra {
+
+enum class Sides { front, back, both };
+enum class Accumulator { binary32, compensated, binary16 };
+enum class Reduction { area, nearest };
+
+// Soft Shadow Maps (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006): each texel of the occluder map is a micro-patch
+// parallel to the light; its back-projection's share of the light is summed.
+struct SoftShadowMap {
+    Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
+    int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
+    Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`
+    Accumulator accumulator = Accumulator::binary32; // binary16: the blending of Appendix A, for study
+    double bias = 1.0;                               // in units of the bound derived from each texel's slope and the depth's precision
+    bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
+    int project_resolution = 512;                    // of that mask
+};
+
+} // namespace penumbra

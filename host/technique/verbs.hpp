@@ -1,0 +1,127 @@
+// The verbs that a technique owns, and the small views of a scene that it is handed for them.
+//
+// A technique is a settings struct S of the variant Technique (penumbra/technique.hpp). Beside it stand these functions, found by overload:
+//
+//   TechniqueRow row(const S&)                                              its kind, keys and lights (table.hpp)
+//   Needs needs(const S&)                                                   what prepare wants of the scene
+//   PreparedS prepare(opencl::Work&, const Casting&, const S&, Findings&)   light and casters become state
+//   void shade(opencl::Work&, const PreparedS&, const Receiving&, Shaded&)  state and receivers become visibility
+//   std::vector<WorkAmount> work(const S&, const MaskShape&)                what a mask costs at the most, for limits
+//   std::vector<opencl::Specialisation> specialisations(const S&, int lanes)
+//                                       every program that masks with these settings launch on a device of so many lanes
+//   DeviceBuffers device_buffers(const S&)                                  whether depth and mask may stay on the device
+//
+// One more for those whose row says textured_lights:
+//
+//   PreparedS with_emission(opencl::Work&, const PreparedS&, const Light&)  the same light under another emission
+//
+// techniques.hpp checks that each has them all.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <penumbra/error.hpp>
+#include <penumbra/mask_job.hpp>
+#include <penumbra/scene.hpp>
+
+#include "opencl/work.hpp"
+#include "scene/camera.hpp"
+#include "silhouette/silhouette.hpp"
+#include "technique/receiver_points.hpp"
+#include "trace/tracer.hpp"
+
+namespace penumbra {
+
+// What a technique wants of a scene before it prepares.
+struct Needs {
+    // The light's own view of what casts: rendered from the objects that cast where the scene has no map.
+    bool front = false, back = false;
+    // Objects that cast. or_front: without any, the maps that the scene has do, of which front must be one.
+    enum class Casters { unused, or_front, required };
+    Casters casters = Casters::unused;
+    // Receiving::from_light: what the light sees of the receivers.
+    bool receivers_from_light = false;
+};
+
+// Depth as the light sees it: planar, row-major, `width` x `height`, in one place or the other. What was not asked for may be missing.
+struct LightDepth {
+    Camera camera; // the light's own view
+    int width = 0, height = 0;
+    const DepthMap *front = nullptr, *back = nullptr;
+    std::span<const DepthMap> layers;
+    cl::Buffer device_front, device_back; // where the caller has it on the device already
+};
+
+// What prepare is handed. Everything stays the caller's and lives as long as the call.
+struct Casting {
+    const Light& light;
+    LightDepth depth;
+    std::vector<const TriangleMesh*> meshes; // of the objects that cast, world space; none: the maps are all there is
+    // How those triangles hang together, and a hierarchy of them for rays: built by whoever asks first, kept with the scene's geometry.
+    std::function<std::shared_ptr<const Topology>()> topology;
+    std::function<std::shared_ptr<const Tracer>()> tracer;
+};
+
+// What prepare has to say beside its state.
+struct Findings {
+    Camera view;      // the light's view that receivers are to come in; unused by rays
+    int channels = 1; // of the visibility: 3 for a coloured texture
+    std::vector<std::string> warnings, notes;
+};
+
+// The receivers of one mask: the depth image of one camera, on the host or on the device.
+struct Receiving {
+    Camera camera;
+    int width = 0, height = 0;
+    const DepthMap* depth = nullptr;
+    cl::Buffer device_depth; // where there is no `depth`
+    const Camera& view;      // Findings::view
+    // Depth of the receivers in that view, resolution x resolution. Empty unless Needs asked for it.
+    std::function<DepthMap(int resolution)> from_light;
+};
+
+// What shading counted. Zero where the work is only queued.
+struct ShadeCounts {
+    std::uint64_t pairs = 0;               // (texel, receiver) pairs evaluated; rays
+    std::uint64_t receivers = 0;           // that are there
+    std::uint64_t uncovered_receivers = 0; // that see part of the light past the occluder map's border
+};
+
+// Where shade puts its result: into the buffer where it runs on the device, into the image where it runs on the host.
+struct Shaded {
+    cl::Buffer visibility; // [height][width][channels] float32
+    Image image;
+    ShadeCounts* counts = nullptr; // null: do not wait for the device to count
+};
+
+// The size of what a mask is made from.
+struct MaskShape {
+    struct Map {
+        int width, height;
+    };
+    Map receivers{};
+    std::vector<Map> occluders; // of each light
+
+    double pixels() const { return static_cast<double>(receivers.width) * receivers.height; }
+    double lights() const { return static_cast<double>(occluders.size()); }
+};
+
+// Why a technique cannot start from depth that is on the device, or leave a mask there; nothing: it can.
+struct DeviceBuffers {
+    std::optional<Error> prepare, shade;
+};
+
+// Receiver points of depth that is on the host (uploaded in a stage of its own) or on the device already, for a technique whose `program`
+// has the kernel. The stage "receivers" or the running one is left running.
+ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
+ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera& camera, const Camera& view,
+                         const opencl::Specialisation& program);
+
+} // namespace penumbra
