@@ -1,6 +1,7 @@
 #include "kept_scene.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include <penumbra/error.hpp>
@@ -10,8 +11,6 @@
 #include "io/scene_parts.hpp"
 #include "problem.hpp"
 #include "resources.hpp"
-#include "scene/light_space.hpp"
-#include "scene/lights.hpp"
 #include "scene_patch.hpp"
 
 namespace penumbra::server {
@@ -77,21 +76,29 @@ struct KeptScene::Changes {
     std::string text(const char* section) const { return after.contains(section) ? after[section].dump() : std::string(); }
 };
 
-KeptScene::KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline)
-    : id_(std::move(id)), owned_(copied(parts)), parts_(views(owned_)),
-      scene_(decode_scene(parts_, options, deadline)), first_choice_{.light = {}, .frame = frame_count(scene_) > 0 ? 1 : 0},
-      lights_(lights_of(scene_)), receivers_(std::make_shared<const Receivers>(std::move(scene_.receivers))),
-      geometry_(std::move(scene_.objects), light_frame(lights_->list.front().light).origin), cache_(lights_->list.size())
+KeptScene::Decoded KeptScene::decoded(std::span<const Part> parts, const Options& options, const Deadline& deadline)
 {
-    document_ = parse_json(find_scene(parts_, options)->bytes);
+    Scene scene = decode_scene(parts, options, deadline);
+    const Technique technique = technique_from(scene.technique);
+    const MaskChoice first{.light = {}, .frame = frame_count(scene) > 0 ? 1 : 0};
+    const OutputFormat output = scene.output;
+    return {.job = job_of(std::move(scene), technique), .output = output, .first = first};
+}
+
+KeptScene::KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline)
+    : id_(std::move(id)), owned_(copied(parts)), parts_(views(owned_)), scene_(decoded(parts_, options, deadline)),
+      document_(parse_json(find_scene(parts_, options)->bytes)), cache_(scene_.job.lights.size())
+{
 }
 
 std::uint64_t KeptScene::bytes() const
 {
-    std::uint64_t bytes = geometry_.bytes() + cache_.host_bytes() + cache_.device_bytes();
+    std::uint64_t bytes = scene_.job.geometry.bytes() + cache_.host_bytes() + cache_.device_bytes();
     for (const auto& [name, part] : owned_) bytes += name.size() + part.size();
-    bytes += depth_bytes(*lights_->shared) + depth_bytes(receivers_->depth);
-    for (const Lights::One& light : lights_->list) bytes += emission_bytes(light.light) + (light.own ? depth_bytes(*light.own) : 0);
+    bytes += depth_bytes(scene_.job.receivers->depth);
+    std::set<const Occluders*> counted; // several lights may share theirs
+    for (const MaskLight& light : scene_.job.lights)
+        bytes += emission_bytes(light.light) + (counted.insert(light.occluders.get()).second ? depth_bytes(*light.occluders) : 0);
     return bytes;
 }
 
@@ -105,7 +112,7 @@ std::string KeptScene::content_of(std::string_view patch, std::span<const Part> 
 
 void KeptScene::check_objects(const Changes& changes) const
 {
-    if (geometry_.objects().empty()) return;
+    if (scene_.job.geometry.objects().empty()) return;
     const auto objects = changes.after.find("objects");
     if (objects == changes.after.end()) return;
     if (mentions(*objects, changes.names))
@@ -116,59 +123,40 @@ void KeptScene::check_objects(const Changes& changes) const
                     "give that object a camera of kind pinhole, or upload the scene anew");
 }
 
-std::shared_ptr<const KeptScene::Lights> KeptScene::lights_of(Scene& scene)
-{
-    Lights lights;
-    if (scene.lights.empty()) lights.list.push_back({.name = {}, .weight = 1, .light = std::move(scene.light), .own = nullptr});
-    for (SceneLight& light : scene.lights) {
-        auto own = light.occluders ? std::make_shared<const Occluders>(std::move(*light.occluders)) : nullptr;
-        lights.list.push_back({.name = light.name, .weight = light.weight, .light = std::move(light.light), .own = std::move(own)});
-    }
-    lights.shared = std::make_shared<const Occluders>(std::move(scene.occluders));
-    return std::make_shared<const Lights>(std::move(lights));
-}
-
-std::shared_ptr<const KeptScene::Lights> KeptScene::patched_lights(const Changes& changes, const JsonObject& root,
-                                                                   const Resources& resources, std::vector<std::string>& warnings) const
+std::vector<MaskLight> KeptScene::patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
+                                                 std::vector<std::string>& warnings) const
 {
     Scene scene;
     parse_lights(root, resources, scene);
     const bool listed = !scene.lights.empty() || document_.contains("lights");
+    const MaskLight& before = scene_.job.lights.front();
     // A light's camera reads differently for a directional light.
-    const bool same_cameras = is_directional(scene.light) == is_directional(lights_->list.front().light);
+    const bool same_cameras = is_directional(scene.light) == is_directional(before.light);
     const bool same_occluders = !listed && changes.same("occluders") && (same_cameras || !root.has("occluders"));
     if (!same_occluders) parse_all_occluders(root, resources, scene);
     warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
-    Lights lights = *lights_of(scene);
-    if (same_occluders) lights.shared = lights_->shared;
-    return std::make_shared<const Lights>(std::move(lights));
+    std::vector<MaskLight> lights = lights_of(std::move(scene));
+    if (same_occluders) lights.front().occluders = before.occluders;
+    return lights;
 }
 
 // What came with this request alone has no name that would say what it was.
-std::vector<TaskLight> KeptScene::chosen(const Changes& changes, const Lights& lights, bool same_occluders, const MaskChoice& choice)
+void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lights, bool same_occluders, const MaskChoice& choice,
+                       MaskTask& task)
 {
-    std::vector<Choosable> choosable;
-    for (const Lights::One& light : lights.list) choosable.push_back({light.name, static_cast<int>(frames_of(light.light))});
-    std::vector<TaskLight> result;
-    for (const std::size_t i : chosen_from(choosable, choice)) {
-        const Lights::One& light = lights.list[i];
-        const nlohmann::json& json = light.name.empty() ? changes.after["light"] : changes.after["lights"][i];
-        TaskLight task{.name = light.name,
-                       .weight = light.weight,
-                       .place = i,
-                       .own_occluders = light.own != nullptr,
-                       .light = at_frame(light.light, choice.frame),
-                       .occluders = light.own ? light.own : lights.shared,
-                       .key = json.dump() + '\n' + changes.text("technique"),
-                       .still_key = {}};
-        if (!same_occluders || mentions(json, changes.names)) task.key.clear();
-        if (choosable[i].frames > 0 && !task.key.empty()) {
-            task.still_key = task.key;
-            task.key += "\nframe " + std::to_string(choice.frame);
+    for (const std::size_t i : chosen_from(lights, choice)) {
+        const MaskLight& light = lights[i];
+        const nlohmann::json& json = light.place ? changes.after["lights"][*light.place] : changes.after["light"];
+        MaskTask::LightKeys keys;
+        if (same_occluders && !mentions(json, changes.names)) keys.frame = json.dump() + '\n' + changes.text("technique");
+        if (frames_of(light.light) > 0 && !keys.frame.empty()) {
+            keys.still = keys.frame;
+            keys.frame += "\nframe " + std::to_string(choice.frame);
         }
-        result.push_back(std::move(task));
+        task.job.lights.push_back(at_choice(light, choice));
+        task.light_keys.push_back(std::move(keys));
     }
-    return result;
+    task.job.combined = task.job.lights.size() > 1;
 }
 
 MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
@@ -183,33 +171,37 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
     std::vector<Part> parts(extra.begin(), extra.end());
     parts.insert(parts.end(), parts_.begin(), parts_.end());
     const RequestResources resources(parts, options, deadline);
-    MaskTask task{.lights = {},
-                  .receivers = receivers_,
-                  .geometry = geometry_,
-                  .technique = technique_from(scene_.technique),
+    MaskTask task{.job = {.lights = {},
+                          .receivers = scene_.job.receivers,
+                          .geometry = scene_.job.geometry,
+                          .technique = scene_.job.technique,
+                          .warnings = scene_.job.warnings,
+                          .combined = false},
                   .output = scene_.output,
-                  .warnings = scene_.warnings,
                   .cache = &cache_,
+                  .light_keys = {},
                   .receivers_key = changes.text("receivers")};
     resources.without_paths([&] {
         const JsonObject root(JsonValue(after, {}));
         if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
         if (!changes.same("technique"))
-            task.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
+            task.job.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
 
         const bool same_lights = changes.same_lights() && changes.same("occluders");
-        const auto lights = same_lights ? lights_ : patched_lights(changes, root, resources, task.warnings);
-        const Light& first = lights->list.front().light;
-        const bool same_cameras = is_directional(first) == is_directional(lights_->list.front().light);
+        std::vector<MaskLight> patched;
+        if (!same_lights) patched = patched_lights(changes, root, resources, task.job.warnings);
+        const std::vector<MaskLight>& lights = same_lights ? scene_.job.lights : patched;
+        const Light& first = lights.front().light;
+        const bool same_cameras = is_directional(first) == is_directional(scene_.job.lights.front().light);
         check_shared_views(root);
         if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
-            task.receivers = std::make_shared<const Receivers>(
-                root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.warnings) : Receivers{});
+            task.job.receivers = std::make_shared<const Receivers>(
+                root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.job.warnings) : Receivers{});
 
-        task.lights = chosen(changes, *lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice);
+        choose(changes, lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice, task);
         if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
         // Seen from the light, or fitted by it, the receivers depend on it.
-        if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
+        if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.job.receivers->camera))
             task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
     });
     return task;

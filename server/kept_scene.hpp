@@ -32,7 +32,7 @@ public:
     KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline);
 
     const std::string& id() const { return id_; }
-    const std::vector<std::string>& warnings() const { return scene_.warnings; }
+    const std::vector<std::string>& warnings() const { return scene_.job.warnings; }
     std::uint64_t bytes() const; // all that it holds now, on the device as well
     std::uint64_t device_bytes() const { return cache_.device_bytes(); }
     void forget_results() const { cache_.clear(); }
@@ -46,37 +46,29 @@ public:
                   const Deadline& deadline) const;
 
     // All lights together, in the first frame where there is a sequence: what is prepared when the scene is kept.
-    const MaskChoice& first_choice() const { return first_choice_; }
+    const MaskChoice& first_choice() const { return scene_.first; }
 
 private:
+    // With all its lights and frames; `first`: see first_choice.
+    struct Decoded {
+        MaskJob job;
+        OutputFormat output;
+        MaskChoice first;
+    };
+    static Decoded decoded(std::span<const Part> parts, const Options& options, const Deadline& deadline);
     // What decides whether a kept piece still holds.
     struct Changes;
-    // The scene's only light, or those of its list; and the occluders of those that have none of their own.
-    struct Lights {
-        struct One {
-            std::string name; // empty: the only one
-            double weight = 1;
-            Light light;
-            std::shared_ptr<const Occluders> own; // may be null
-        };
-        std::vector<One> list;
-        std::shared_ptr<const Occluders> shared;
-    };
-    static std::shared_ptr<const Lights> lights_of(Scene& scene);
     void check_objects(const Changes& changes) const;
-    std::shared_ptr<const Lights> patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
-                                                 std::vector<std::string>& warnings) const;
-    static std::vector<TaskLight> chosen(const Changes& changes, const Lights& lights, bool same_occluders, const MaskChoice& choice);
+    std::vector<MaskLight> patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
+                                          std::vector<std::string>& warnings) const;
+    static void choose(const Changes& changes, const std::vector<MaskLight>& lights, bool same_occluders, const MaskChoice& choice,
+                       MaskTask& task);
 
     const std::string id_;
     std::vector<std::pair<std::string, std::string>> owned_; // names and bytes of the parts
     std::vector<Part> parts_;                                // views of owned_
+    Decoded scene_;
     nlohmann::json document_;
-    Scene scene_; // decoded; without what the pointers below hold
-    MaskChoice first_choice_;
-    std::shared_ptr<const Lights> lights_;
-    std::shared_ptr<const Receivers> receivers_;
-    Geometry geometry_;
     mutable MaskCache cache_;
 };
 

@@ -16,7 +16,6 @@
 
 #include "descriptors.hpp"
 #include "notify.hpp"
-#include "opencl/quirks.hpp"
 #include "options.hpp"
 #include "service.hpp"
 
@@ -73,7 +72,7 @@ int serve(const Options& options, const Environment& environment)
         !unknown.empty())
         say("warning: " + unknown);
     const Notifier notifier(environment);
-    opencl::prepare_environment();
+    prepare_environment();
     Service service(options, options.device.empty() ? Engine() : Engine(options.device), say);
     const int port = begin(options, service);
     tell(notifier, "STATUS=building kernels and checking the device");

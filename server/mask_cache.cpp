@@ -1,9 +1,9 @@
 #include "mask_cache.hpp"
 
 #include <algorithm>
-#include <set>
+#include <vector>
 
-#include "engine/state.hpp"
+#include <penumbra/describe.hpp>
 
 namespace penumbra::server {
 namespace {
@@ -70,13 +70,9 @@ std::uint64_t MaskCache::host_bytes() const
 std::uint64_t MaskCache::device_bytes() const
 {
     const std::scoped_lock lock(mutex_);
-    // Frames of a sequence share some of what they hold.
-    std::set<const opencl::MemoryMeter*> meters;
-    for (const auto& [key, prepared] : prepared_) meters.insert({prepared.state().memory.get(), prepared.state().shared.get()});
-    std::uint64_t bytes = 0;
-    for (const opencl::MemoryMeter* meter : meters)
-        if (meter) bytes += meter->live;
-    return bytes;
+    std::vector<Prepared> all;
+    for (const auto& [key, prepared] : prepared_) all.push_back(prepared);
+    return penumbra::device_bytes(all);
 }
 
 } // namespace penumbra::server

@@ -4,7 +4,6 @@
 #include <charconv>
 
 #include "problem.hpp"
-#include "scene/lights.hpp"
 
 namespace penumbra::server {
 namespace {

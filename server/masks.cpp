@@ -7,13 +7,9 @@
 #include <penumbra/error.hpp>
 
 #include "digest.hpp"
-#include "engine/state.hpp"
-#include "engine/weighted_mean.hpp"
 #include "io/scene_file.hpp"
 #include "problem.hpp"
 #include "resources.hpp"
-#include "scene/light_space.hpp"
-#include "scene/lights.hpp"
 #include "work_limits.hpp"
 
 namespace penumbra::server {
@@ -34,74 +30,42 @@ OutputFormat encoding_of(const MaskTask& task, const MaskFormat& format)
     return {std::string(format.format), wanted == format.format ? task.output.bits : 0};
 }
 
-std::shared_ptr<const Receivers> rendered_receivers(const MaskTask& task, std::vector<Stage>& stages)
-{
-    if (task.cache)
-        if (auto kept = task.cache->receivers(task.receivers_key)) return kept;
-    const Stopwatch watch;
-    auto receivers = std::make_shared<const Receivers>(with_depth(*task.receivers, task.lights.front().light, task.geometry));
-    stages.push_back({"render depth", watch.ms(), 0, 0});
-    if (task.cache) task.cache->keep(task.receivers_key, receivers);
-    return receivers;
-}
-
-// The mask of one of the task's lights; the first one renders the receivers.
-Mask mask_of(const Engine& engine, const MaskTask& task, const TaskLight& light, std::shared_ptr<const Receivers>& receivers,
-             const Deadline& deadline)
-{
-    std::vector<Stage> stages;
-    const bool kept = task.cache && task.cache->prepared(light.key);
-    const Prepared prepared = prepare(engine, task, light, deadline);
-
-    if (!receivers) {
-        deadline.check("the receivers' depth");
-        receivers = rendered_receivers(task, stages);
+// What a run of the task finds in its cache and leaves there.
+class TaskKeeper : public MaskKeeper {
+public:
+    explicit TaskKeeper(const MaskTask& task) : task_(task) {}
+    std::optional<Prepared> prepared(std::size_t light, int) override { return task_.cache->prepared(task_.light_keys[light].frame); }
+    std::optional<Prepared> prepared_in_any_frame(std::size_t light) override
+    {
+        return task_.cache->prepared(task_.light_keys[light].still);
     }
-    deadline.check("shading");
-    Mask mask = engine.shade(prepared, *receivers);
-    if (!kept) add_stages(stages, prepared.state().stages);
-    add_stages(stages, mask.report.stages);
-    mask.report.stages = std::move(stages);
-    return mask;
-}
+    void keep(std::size_t light, int, const Prepared& prepared) override
+    {
+        task_.cache->keep(task_.light_keys[light].still, prepared);
+        task_.cache->keep(task_.light_keys[light].frame, prepared);
+    }
+    std::shared_ptr<const Receivers> receivers() override { return task_.cache->receivers(task_.receivers_key); }
+    void keep(std::shared_ptr<const Receivers> receivers) override { task_.cache->keep(task_.receivers_key, std::move(receivers)); }
 
-// Calls it with each light; what goes wrong with one of a list names its place.
-template <class Call> void for_each_light(const MaskTask& task, const Call& call)
+private:
+    const MaskTask& task_;
+};
+
+// Calls it with the hooks of a run of the task: its cache, and the deadline between steps.
+template <class Call> void with_hooks(const MaskTask& task, const Deadline& deadline, const Call& call)
 {
-    for (const TaskLight& light : task.lights) try {
-            call(light);
-        } catch (const Error& error) {
-            if (light.name.empty()) throw;
-            throw in_list(error, light.place, light.own_occluders);
-        }
+    TaskKeeper keeper(task);
+    call(MaskHooks{.keeper = task.cache ? &keeper : nullptr, .before = [&](std::string_view next) { deadline.check(next); }});
 }
 
-// The mask of all the task's lights together.
+// The mask of all the task's lights together, which a run gives last.
 Mask mask_of(const Engine& engine, const MaskTask& task, const Deadline& deadline)
 {
-    const bool alone = task.lights.size() == 1;
-    std::shared_ptr<const Receivers> receivers;
-    WeightedMean mean;
-    Mask all;
-    for_each_light(task, [&](const TaskLight& light) {
-        Mask mask = mask_of(engine, task, light, receivers, deadline);
-        if (!alone) mean.add(mask.visibility, light.weight);
-        if (alone)
-            all = std::move(mask);
-        else
-            add_report(all.report, mask.report, light.name, {});
+    Mask last;
+    with_hooks(task, deadline, [&](const MaskHooks& hooks) {
+        engine.masks(task.job, hooks, [&](NamedMask&& named) { last = std::move(named.mask); });
     });
-    if (!alone) all.visibility = mean.take();
-    all.report.warnings.insert(all.report.warnings.begin(), task.warnings.begin(), task.warnings.end());
-    return all;
-}
-
-std::vector<Choosable> choosable(const Scene& scene)
-{
-    if (scene.lights.empty()) return {{.name = {}, .frames = static_cast<int>(frames_of(scene.light))}};
-    std::vector<Choosable> lights;
-    for (const SceneLight& light : scene.lights) lights.push_back({light.name, static_cast<int>(frames_of(light.light))});
-    return lights;
+    return last;
 }
 
 } // namespace
@@ -125,62 +89,40 @@ Scene decode_scene(std::span<const Part> parts, const Options& options, const De
     return resources.without_paths([&] { return parse_scene(part->bytes, resources); });
 }
 
+std::vector<std::size_t> chosen_from(const std::vector<MaskLight>& lights, const MaskChoice& choice)
+{
+    std::vector<Choosable> choosable;
+    for (const MaskLight& light : lights) choosable.push_back({light.name, static_cast<int>(frames_of(light.light))});
+    return chosen_from(choosable, choice);
+}
+
+MaskLight at_choice(const MaskLight& light, const MaskChoice& choice)
+{
+    MaskLight now{.name = light.name,
+                  .weight = light.weight,
+                  .place = light.place,
+                  .light = at_frame(light.light, choice.frame),
+                  .occluders = light.occluders,
+                  .own_occluders = light.own_occluders};
+    return now;
+}
+
 MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Options& options, const Deadline& deadline)
 {
     Scene scene = decode_scene(parts, options, deadline);
-    const auto shared = std::make_shared<const Occluders>(std::move(scene.occluders));
-    const Vec3 origin = light_frame(scene.lights.empty() ? scene.light : scene.lights.front().light).origin;
-    MaskTask task{.lights = {},
-                  .receivers = std::make_shared<const Receivers>(std::move(scene.receivers)),
-                  .geometry = Geometry(std::move(scene.objects), origin),
-                  .technique = technique_from(scene.technique),
-                  .output = scene.output,
-                  .warnings = std::move(scene.warnings),
-                  .cache = nullptr,
-                  .receivers_key = {}};
-    for (const std::size_t i : chosen_from(choosable(scene), choice)) {
-        if (scene.lights.empty()) {
-            task.lights.push_back({.name = {},
-                                   .weight = 1,
-                                   .place = 0,
-                                   .own_occluders = false,
-                                   .light = at_frame(scene.light, choice.frame),
-                                   .occluders = shared,
-                                   .key = {},
-                                   .still_key = {}});
-            continue;
-        }
-        SceneLight& light = scene.lights[i];
-        task.lights.push_back({.name = light.name,
-                               .weight = light.weight,
-                               .place = i,
-                               .own_occluders = light.occluders.has_value(),
-                               .light = at_frame(light.light, choice.frame),
-                               .occluders = light.occluders ? std::make_shared<const Occluders>(std::move(*light.occluders)) : shared,
-                               .key = {},
-                               .still_key = {}});
-    }
+    const Technique technique = technique_from(scene.technique);
+    const OutputFormat output = scene.output;
+    MaskTask task{.job = job_of(std::move(scene), technique), .output = output};
+    std::vector<MaskLight> chosen;
+    for (const std::size_t i : chosen_from(task.job.lights, choice)) chosen.push_back(at_choice(task.job.lights[i], choice));
+    task.job.lights = std::move(chosen);
+    task.job.combined = task.job.lights.size() > 1;
     return task;
-}
-
-Prepared prepare(const Engine& engine, const MaskTask& task, const TaskLight& light, const Deadline& deadline)
-{
-    if (task.cache)
-        if (const auto kept = task.cache->prepared(light.key)) return *kept;
-    deadline.check("preparing");
-    const auto still = task.cache ? task.cache->prepared(light.still_key) : std::nullopt;
-    const Prepared prepared = still ? engine.with_emission(*still, *std::get<RectangleLight>(light.light).emission)
-                                    : engine.prepare(light.light, *light.occluders, task.geometry, task.technique);
-    if (task.cache) {
-        task.cache->keep(light.still_key, prepared);
-        task.cache->keep(light.key, prepared);
-    }
-    return prepared;
 }
 
 void prepare_all(const Engine& engine, const MaskTask& task, const Deadline& deadline)
 {
-    for_each_light(task, [&](const TaskLight& light) { prepare(engine, task, light, deadline); });
+    with_hooks(task, deadline, [&](const MaskHooks& hooks) { engine.prepare(task.job, hooks); });
 }
 
 MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFormat& format, const Options& options,
@@ -188,15 +130,15 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
 {
     check_work(task, options);
     MaskReply reply;
-    const Stopwatch computing;
+    const auto computing = Deadline::Clock::now();
     const Mask mask = mask_of(engine, task, deadline);
-    reply.compute_ms = computing.ms();
+    reply.compute_ms = seconds_since(computing) * 1000;
 
     deadline.check("encoding the mask");
-    const Stopwatch encoding;
+    const auto encoding = Deadline::Clock::now();
     const std::vector<std::byte> bytes = encode_image(mask.visibility, encoding_of(task, format));
     reply.bytes.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    reply.encode_ms = encoding.ms();
+    reply.encode_ms = seconds_since(encoding) * 1000;
 
     reply.technique = mask.report.technique;
     reply.pixels = mask.visibility.pixel_count();

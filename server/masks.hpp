@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <penumbra/engine.hpp>
+#include <penumbra/mask_job.hpp>
 
 #include "gate.hpp"
 #include "mask_cache.hpp"
@@ -19,29 +20,19 @@
 
 namespace penumbra::server {
 
-// One of the lights of a task, at the frame that was asked for. With a cache, what is prepared for it is looked up there first: under
-// `key`, which says the frame; of a light with a sequence then under `still_key`, for what all frames share. Empty keys are not kept.
-struct TaskLight {
-    std::string name; // empty: the scene has no `lights`
-    double weight = 1;
-    std::size_t place = 0; // in `lights`
-    bool own_occluders = false;
-    Light light;
-    std::shared_ptr<const Occluders> occluders;
-    std::string key, still_key;
-};
-
-// What a mask is computed from, decoded. With a cache, rendered receivers are looked up there first, under their key.
+// What a mask is computed from, decoded, and under which names its pieces are kept. Keys are texts that say all that a piece was made from;
+// what has an empty one is not kept.
 struct MaskTask {
-    std::vector<TaskLight> lights; // at least one; of several the mask is that of all together
-    std::shared_ptr<const Receivers> receivers;
-    Geometry geometry;
-    Technique technique;
+    MaskJob job; // at the frame that was asked for
     OutputFormat output;
-    std::vector<std::string> warnings;
 
+    struct LightKeys {
+        std::string frame; // of the light in that frame
+        std::string still; // of a light with a sequence: what all its frames share
+    };
     MaskCache* cache = nullptr;
-    std::string receivers_key;
+    std::vector<LightKeys> light_keys = {}; // of each of the job's lights
+    std::string receivers_key = {};
 };
 
 struct StageTime {
@@ -64,13 +55,14 @@ const Part* find_scene(std::span<const Part> parts, const Options& options);
 // Parses part `scene` and loads what it names. Throws Error and Problem.
 Scene decode_scene(std::span<const Part> parts, const Options& options, const Deadline& deadline);
 
+// The lights of a job that are chosen, by their places in it (mask_choice.hpp), and one as it is in the frame that is.
+std::vector<std::size_t> chosen_from(const std::vector<MaskLight>& lights, const MaskChoice& choice);
+MaskLight at_choice(const MaskLight& light, const MaskChoice& choice);
+
 // The task of a scene that came with its request.
 MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Options& options, const Deadline& deadline);
 
-// Prepares one of the task's lights, or takes it from the task's cache. Throws Error and Problem.
-Prepared prepare(const Engine& engine, const MaskTask& task, const TaskLight& light, const Deadline& deadline);
-
-// Prepares all of them, for the task's cache.
+// Prepares all the task's lights, for its cache. Throws Error and Problem.
 void prepare_all(const Engine& engine, const MaskTask& task, const Deadline& deadline);
 
 // The deadline is checked between stages. `format`: what negotiate gave; bits are those of the scene's output when that names the same

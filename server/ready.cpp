@@ -4,9 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include <penumbra/describe.hpp>
 #include <penumbra/error.hpp>
-
-#include "technique/table.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -66,21 +65,7 @@ void check_known_mask(const Engine& engine)
 void warm(const Engine& engine)
 {
     const Scene scene = known_scene();
-    for (const TechniqueRow& row : technique_table()) {
-        engine.mask(scene, row.defaults);
-        for (const SettingKey& key : row.keys) {
-            Technique technique = row.defaults;
-            if (std::holds_alternative<Flag>(key.domain)) {
-                key.set(technique, SettingValue{!std::get<bool>(key.get(row.defaults))});
-                engine.mask(scene, technique);
-            }
-            if (const auto* choices = std::get_if<Choices>(&key.domain))
-                for (const std::string_view name : choices->names) {
-                    key.set(technique, SettingValue{std::string(name)});
-                    engine.mask(scene, technique);
-                }
-        }
-    }
+    for (const Technique& technique : technique_choices()) engine.mask(scene, technique);
     // A reduced occluder map has a kernel of its own.
     engine.mask(scene, SoftShadowMap{.resolution = side / 2});
     engine.mask(scene, SoftShadowMap{.resolution = side / 2, .reduction = Reduction::nearest});

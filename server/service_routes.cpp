@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <penumbra/describe.hpp>
+
 #include "answer.hpp"
 #include "describe.hpp"
 #include "page.hpp"

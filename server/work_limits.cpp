@@ -4,11 +4,8 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
-#include <variant>
 
 #include <penumbra/error.hpp>
-
-#include "technique/occluder_maps.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -31,68 +28,37 @@ void check_amount(std::string_view where, double amount, std::string_view what, 
                 "the limit of the service is " + std::to_string(limit));
 }
 
-struct WorkCheck {
-    const MaskTask& task;
-    const Options& options;
-    double pixels() const { return static_cast<double>(task.receivers->width) * task.receivers->height; }
-    double lights() const { return static_cast<double>(task.lights.size()); }
-
-    void operator()(const ShadowMap&) const {}
-    void operator()(const SoftShadowMap& settings) const
-    {
-        double texels = 0;
-        for (const TaskLight& light : task.lights) {
-            const MapSize map = reduced_size(light.occluders->width, light.occluders->height, settings.resolution);
-            texels += static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
-        }
-        if (settings.project)
-            check_pixels("technique.project_resolution", settings.project_resolution, settings.project_resolution, options.receivers);
-        const double points = settings.project ? static_cast<double>(settings.project_resolution) * settings.project_resolution : pixels();
-        check_amount("receivers.resolution", texels * points, "pairs of occluder texel and receiver", options.pairs);
+// The option that bounds work counted in that unit.
+std::int64_t limit_of(WorkAmount::Unit unit, const Options& options)
+{
+    switch (unit) {
+    case WorkAmount::Unit::pairs: return options.pairs;
+    case WorkAmount::Unit::rays: return options.rays;
+    case WorkAmount::Unit::slice_texels: return options.image_samples;
+    case WorkAmount::Unit::receivers: return options.receivers;
     }
-    // How many edges and triangles a receiver meets is known when silhouettes are; this many are taken for granted.
-    void operator()(const SoftShadowVolume& settings) const
-    {
-        constexpr double met = 4096;
-        const double parts = static_cast<double>(settings.light_splits) * settings.light_splits;
-        check_amount("technique.light_splits", parts * lights() * pixels() * met,
-                     "pairs of edge and receiver, at 4096 edges a receiver and part", options.pairs);
-    }
-    // Lookups of a receiver, and texels of the slices that are prefiltered.
-    void operator()(const OcclusionTexture& settings) const
-    {
-        const bool layered = settings.combine == Combine::layered || settings.combine == Combine::layered_max;
-        const double textures =
-            lights() * settings.light_splits * settings.light_splits * settings.slices * (layered ? settings.layers : 1);
-        check_amount("technique.slices", textures * pixels(), "pairs of slice and receiver", options.pairs);
-        check_amount("technique.resolution", textures * settings.resolution * settings.resolution, "texels of slices",
-                     options.image_samples);
-    }
-    void operator()(const Smoothie&) const {}
-    void operator()(const RayTraced& settings) const
-    {
-        check_amount("technique.samples", lights() * pixels() * settings.samples, "rays", options.rays);
-    }
-};
+    return 0;
+}
 
 } // namespace
 
 void check_work(const MaskTask& task, const Options& options)
 {
-    const Receivers& receivers = *task.receivers;
+    const Receivers& receivers = *task.job.receivers;
     check_pixels("receivers.resolution", receivers.width, receivers.height, options.receivers);
     double texels = 0;
-    for (const TaskLight& light : task.lights) {
+    for (const MaskLight& light : task.job.lights) {
         const Occluders& occluders = *light.occluders;
         check_pixels("occluders.resolution", occluders.width, occluders.height, options.image_samples);
         texels += static_cast<double>(occluders.width) * occluders.height;
     }
-    if (task.lights.size() > 1) {
-        const double points = static_cast<double>(receivers.width) * receivers.height * static_cast<double>(task.lights.size());
+    if (task.job.lights.size() > 1) {
+        const double points = static_cast<double>(receivers.width) * receivers.height * static_cast<double>(task.job.lights.size());
         check_amount("lights", points, "receivers, over all lights", options.receivers);
         check_amount("lights", texels, "texels of occluder maps, over all lights", options.image_samples);
     }
-    std::visit(WorkCheck{task, options}, task.technique);
+    for (const WorkAmount& work : work_of(task.job))
+        check_amount(work.key, work.amount, work.what, limit_of(work.unit, options));
 }
 
 } // namespace penumbra::server

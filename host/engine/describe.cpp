@@ -1,10 +1,14 @@
-#include "describe.hpp"
+#include <penumbra/describe.hpp>
+
+#include <set>
 
 #include <nlohmann/json.hpp>
 
 #include "engine/report.hpp"
+#include "engine/state.hpp"
+#include "opencl/quirks.hpp"
 
-namespace penumbra::server {
+namespace penumbra {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -29,6 +33,18 @@ Json schema_of(const TechniqueRow& row)
             {"additionalProperties", false}};
 }
 
+// The values of a flag or choice but the default.
+std::vector<SettingValue> other_values(const SettingKey& key, const Technique& defaults)
+{
+    const SettingValue usual = key.get(defaults);
+    if (std::holds_alternative<Flag>(key.domain)) return {SettingValue{!std::get<bool>(usual)}};
+    std::vector<SettingValue> values;
+    if (const auto* choices = std::get_if<Choices>(&key.domain))
+        for (const std::string_view name : choices->names)
+            if (SettingValue value{std::string(name)}; value != usual) values.push_back(std::move(value));
+    return values;
+}
+
 } // namespace
 
 std::string techniques_json()
@@ -48,4 +64,28 @@ std::string devices_json(const std::vector<DeviceInfo>& devices, int selected)
     return text_of({{"version", version()}, {"devices", list}});
 }
 
-} // namespace penumbra::server
+std::vector<Technique> technique_choices()
+{
+    std::vector<Technique> all;
+    for (const TechniqueRow& row : technique_table()) {
+        all.push_back(row.defaults);
+        for (const SettingKey& key : row.keys)
+            for (const SettingValue& value : other_values(key, row.defaults)) key.set(all.emplace_back(row.defaults), value);
+    }
+    return all;
+}
+
+std::uint64_t device_bytes(std::span<const Prepared> prepared)
+{
+    // Frames of a sequence share some of what they hold.
+    std::set<const opencl::MemoryMeter*> meters;
+    for (const Prepared& one : prepared) meters.insert({one.state().memory.get(), one.state().shared.get()});
+    std::uint64_t bytes = 0;
+    for (const opencl::MemoryMeter* meter : meters)
+        if (meter) bytes += meter->live;
+    return bytes;
+}
+
+void prepare_environment() { opencl::prepare_environment(); }
+
+} // namespace penumbra

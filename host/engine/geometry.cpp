@@ -12,10 +12,14 @@ const std::vector<Object>& Geometry::objects() const { return *state_->objects; 
 
 std::uint64_t Geometry::bytes() const { return state_->bytes(); }
 
+Vec3 first_origin(const Scene& scene)
+{
+    return light_frame(scene.lights.empty() ? scene.light : scene.lights.front().light).origin;
+}
+
 Geometry view_of(const Scene& scene)
 {
-    const Light& first = scene.lights.empty() ? scene.light : scene.lights.front().light;
-    return Geometry(std::make_shared<const Geometry::State>(&scene.objects, light_frame(first).origin));
+    return Geometry(std::make_shared<const Geometry::State>(&scene.objects, first_origin(scene)));
 }
 
 bool Geometry::State::any(bool Object::*role) const

@@ -40,6 +40,9 @@ private:
     mutable std::shared_ptr<const Topology> topology_;
 };
 
+// Where the first light of a scene is.
+Vec3 first_origin(const Scene& scene);
+
 // A scene's objects without copying them, near its first light: the scene has to stay.
 Geometry view_of(const Scene& scene);
 

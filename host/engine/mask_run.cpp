@@ -1,78 +1,133 @@
-// From a scene to its masks: of one light, of several and of all together, of each frame.
+// One run of masks: prepare, render what the receivers lack, shade, for each light of each frame, and the mean of them all.
 #include <algorithm>
+#include <map>
 #include <optional>
 
 #include <penumbra/error.hpp>
+#include <penumbra/mask_job.hpp>
 
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/state.hpp"
 #include "engine/weighted_mean.hpp"
 #include "scene/lights.hpp"
+#include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
 
-// A scene on its way through its frames: what its lights share, and what a later frame has from an earlier one.
+// What a run keeps for itself where the caller keeps nothing: of a light with a sequence, the frame before.
+class FrameKeeper : public MaskKeeper {
+public:
+    std::optional<Prepared> prepared(std::size_t, int) override { return std::nullopt; }
+    std::optional<Prepared> prepared_in_any_frame(std::size_t light) override
+    {
+        const auto found = last_.find(light);
+        return found == last_.end() ? std::nullopt : std::optional(found->second);
+    }
+    void keep(std::size_t light, int frame, const Prepared& prepared) override
+    {
+        if (frame > 0) last_.insert_or_assign(light, prepared);
+    }
+    std::shared_ptr<const Receivers> receivers() override { return nullptr; }
+    void keep(std::shared_ptr<const Receivers>) override {}
+
+private:
+    std::map<std::size_t, Prepared> last_;
+};
+
+// A job on its way through its frames.
 class MaskRun {
 public:
-    MaskRun(const Engine& engine, const Scene& scene, const Technique& technique)
-        : engine_(engine), scene_(scene), technique_(technique), geometry_(view_of(scene)),
-          kept_(std::max<std::size_t>(scene.lights.size(), 1))
+    MaskRun(const Engine& engine, const MaskJob& job, const MaskHooks& hooks)
+        : engine_(engine), job_(job), keeper_(hooks.keeper ? *hooks.keeper : own_keeper_), before_(hooks.before), masks_(job.lights.size())
     {
     }
 
-    // The mask of the scene's only light. Frames come in order; 0: there is no sequence.
-    Mask only(int frame) { return next(kept_[0], scene_.light, scene_.occluders, frame); }
+    int frames() const
+    {
+        std::size_t most = 0;
+        for (const MaskLight& light : job_.lights) most = std::max(most, frames_of(light.light));
+        return static_cast<int>(most);
+    }
 
-    // The mask of one of `lights`.
+    // What is prepared for a light, and whether it was kept.
+    std::pair<Prepared, bool> prepare(std::size_t index, int frame)
+    {
+        return in_place(index, [&] { return prepared(index, frame); });
+    }
+
+    // The mask of one light. Frames come in order.
     Mask of(std::size_t index, int frame)
     {
-        const SceneLight& light = scene_.lights[index];
-        try {
-            return next(kept_[index], light.light, light.occluders ? *light.occluders : scene_.occluders, frame);
-        } catch (const Error& error) {
-            throw in_list(error, index, light.occluders.has_value());
-        }
+        return in_place(index, [&] { return mask(index, frame); });
     }
 
 private:
-    // Of one light, from one frame to the next.
-    struct Kept {
-        std::optional<Prepared> prepared; // of a light with a sequence
-        std::optional<Mask> mask;         // of a light without one: it stays
-    };
-
-    Mask next(Kept& kept, const Light& light, const Occluders& occluders, int frame)
+    // What goes wrong with a light of a list names its place there.
+    template <class Call> auto in_place(std::size_t index, const Call& call)
     {
-        if (kept.mask) return *kept.mask;
-        const Stopwatch total;
-        const bool moves = frames_of(light) > 0;
-        const Prepared prepared = prepare(kept, light, occluders, moves ? frame : 0);
-
-        std::vector<Stage> stages;
-        if (!receivers_) {
-            const Stopwatch render;
-            receivers_ = with_depth(scene_.receivers, light, geometry_);
-            stages.push_back({"render depth", render.ms(), 0, 0});
+        const MaskLight& light = job_.lights[index];
+        try {
+            return call();
+        } catch (const Error& error) {
+            if (!light.place) throw;
+            throw in_list(error, *light.place, light.own_occluders);
         }
-        Mask mask = engine_.shade(prepared, *receivers_);
-        add_stages(stages, prepared.state().stages);
-        add_stages(stages, mask.report.stages);
-        mask.report.stages = std::move(stages);
-        mask.report.prepare_ms = prepared.state().prepare_ms;
-        mask.report.warnings.insert(mask.report.warnings.begin(), scene_.warnings.begin(), scene_.warnings.end());
-        mask.report.total_ms = total.ms();
-        if (frame > 0 && moves) kept.prepared = prepared;
-        if (frame > 0 && !moves) kept.mask = without_work(mask);
-        return mask;
     }
 
-    Prepared prepare(const Kept& kept, const Light& light, const Occluders& occluders, int frame) const
+    void before(std::string_view next) const
     {
-        if (kept.prepared)
-            return engine_.with_emission(*kept.prepared, std::get<RectangleLight>(light).frames[static_cast<std::size_t>(frame - 1)]);
-        return engine_.prepare(at_frame(light, frame), occluders, geometry_, technique_);
+        if (before_) before_(next);
+    }
+
+    std::pair<Prepared, bool> prepared(std::size_t index, int frame)
+    {
+        const MaskLight& light = job_.lights[index];
+        // A light without a sequence of its own is the same in all frames.
+        const int own_frame = frames_of(light.light) > 0 ? frame : 0;
+        if (auto kept = keeper_.prepared(index, own_frame)) return {std::move(*kept), true};
+        before("preparing");
+        const Light now = at_frame(light.light, own_frame);
+        const auto still = keeper_.prepared_in_any_frame(index);
+        Prepared made = still ? engine_.with_emission(*still, *std::get<RectangleLight>(now).emission)
+                              : engine_.prepare(now, *light.occluders, job_.geometry, job_.technique);
+        keeper_.keep(index, own_frame, made);
+        return {std::move(made), false};
+    }
+
+    // The receivers with their depth; the first light renders it where it is missing.
+    const Receivers& receivers(const Light& light, std::vector<Stage>& stages)
+    {
+        if (receivers_ || (receivers_ = keeper_.receivers())) return *receivers_;
+        before("the receivers' depth");
+        const Stopwatch watch;
+        receivers_ = std::make_shared<const Receivers>(with_depth(*job_.receivers, light, job_.geometry));
+        stages.push_back({"render depth", watch.ms(), 0, 0});
+        keeper_.keep(receivers_);
+        return *receivers_;
+    }
+
+    Mask mask(std::size_t index, int frame)
+    {
+        if (masks_[index]) return *masks_[index];
+        const Stopwatch total;
+        const auto [made, kept] = prepared(index, frame);
+        std::vector<Stage> stages;
+        const Receivers& seen = receivers(job_.lights[index].light, stages);
+        before("shading");
+        Mask mask = engine_.shade(made, seen);
+        Report& report = mask.report;
+        if (!kept) {
+            add_stages(stages, made.state().stages);
+            report.prepare_ms = made.state().prepare_ms;
+        }
+        add_stages(stages, report.stages);
+        report.stages = std::move(stages);
+        report.warnings.insert(report.warnings.begin(), job_.warnings.begin(), job_.warnings.end());
+        report.total_ms = total.ms();
+        if (frame > 0 && frames_of(job_.lights[index].light) == 0) masks_[index] = without_work(mask);
+        return mask;
     }
 
     // Given again, a mask has cost nothing.
@@ -86,11 +141,12 @@ private:
     }
 
     const Engine& engine_;
-    const Scene& scene_;
-    const Technique& technique_;
-    const Geometry geometry_;
-    std::vector<Kept> kept_;
-    std::optional<Receivers> receivers_;
+    const MaskJob& job_;
+    FrameKeeper own_keeper_;
+    MaskKeeper& keeper_;
+    const std::function<void(std::string_view)>& before_;
+    std::vector<std::optional<Mask>> masks_; // of lights that stay the same while others move
+    std::shared_ptr<const Receivers> receivers_;
 };
 
 NamedMask together(const WeightedMean& mean, Report report, int frame)
@@ -101,6 +157,31 @@ NamedMask together(const WeightedMean& mean, Report report, int frame)
     all.mask.report.stages.push_back({"combine", ms, 0, all.mask.visibility.pixels.size() * sizeof(float)});
     all.mask.report.total_ms += ms;
     return all;
+}
+
+// Occluders that stay where they are, or are the job's own now.
+std::shared_ptr<const Occluders> shared(const Occluders& occluders) { return {std::shared_ptr<const Occluders>(), &occluders}; }
+std::shared_ptr<const Occluders> shared(Occluders&& occluders) { return std::make_shared<const Occluders>(std::move(occluders)); }
+
+// The one list of lights: a scene with one light is a list of one.
+template <class SceneType> std::vector<MaskLight> list_of_lights(SceneType&& scene)
+{
+    const auto common = shared(std::forward<SceneType>(scene).occluders);
+    std::vector<MaskLight> lights;
+    if (scene.lights.empty()) lights.push_back({.name = {}, .light = std::forward<SceneType>(scene).light, .occluders = common});
+    for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+        auto& from = scene.lights[i];
+        MaskLight light{.name = from.name, .weight = from.weight, .place = i, .light = from.light, .occluders = common};
+        if (from.occluders) {
+            light.own_occluders = true;
+            if constexpr (std::is_const_v<std::remove_reference_t<SceneType>>)
+                light.occluders = shared(*from.occluders);
+            else
+                light.occluders = shared(std::move(*from.occluders));
+        }
+        lights.push_back(std::move(light));
+    }
+    return lights;
 }
 
 } // namespace
@@ -123,6 +204,39 @@ void add_report(Report& all, const Report& one, const std::string& name, const s
     all.pairs += one.pairs;
     for (std::size_t i = common.size(); i < one.warnings.size(); ++i) all.warnings.push_back(name + ": " + one.warnings[i]);
     for (const std::string& note : one.notes) all.notes.push_back(name + ": " + note);
+}
+
+std::vector<MaskLight> lights_of(Scene&& scene) { return list_of_lights(std::move(scene)); }
+
+MaskJob job_of(const Scene& scene, const Technique& technique)
+{
+    validate_lights(scene);
+    return {.lights = list_of_lights(scene),
+            .receivers = {std::shared_ptr<const Receivers>(), &scene.receivers},
+            .geometry = view_of(scene),
+            .technique = technique,
+            .warnings = scene.warnings,
+            .combined = !scene.lights.empty()};
+}
+
+MaskJob job_of(Scene&& scene, const Technique& technique)
+{
+    validate_lights(scene);
+    const Vec3 near = first_origin(scene);
+    const bool combined = !scene.lights.empty();
+    return {.lights = list_of_lights(std::move(scene)),
+            .receivers = std::make_shared<const Receivers>(std::move(scene.receivers)),
+            .geometry = Geometry(std::move(scene.objects), near),
+            .technique = technique,
+            .warnings = std::move(scene.warnings),
+            .combined = combined};
+}
+
+std::vector<WorkAmount> work_of(const MaskJob& job)
+{
+    MaskShape shape{.receivers = {job.receivers->width, job.receivers->height}, .occluders = {}};
+    for (const MaskLight& light : job.lights) shape.occluders.push_back({light.occluders->width, light.occluders->height});
+    return std::visit([&](const auto& settings) { return work(settings, shape); }, job.technique);
 }
 
 Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(scene.technique)); }
@@ -148,25 +262,33 @@ std::vector<NamedMask> Engine::masks(const Scene& scene, const Technique& techni
 
 void Engine::masks(const Scene& scene, const Technique& technique, const MaskSink& sink) const
 {
-    validate_lights(scene);
-    MaskRun run(*this, scene, technique);
-    const int frames = frame_count(scene);
+    masks(job_of(scene, technique), {}, sink);
+}
+
+void Engine::masks(const MaskJob& job, const MaskHooks& hooks, const MaskSink& sink) const
+{
+    MaskRun run(*this, job, hooks);
+    const int frames = run.frames();
     for (int frame = frames > 0 ? 1 : 0; frame <= frames; ++frame) {
-        if (scene.lights.empty()) {
-            sink({.light = {}, .frame = frame, .mask = run.only(frame)});
-            continue;
-        }
         WeightedMean mean;
         Report report;
-        for (std::size_t i = 0; i < scene.lights.size(); ++i) {
-            const SceneLight& light = scene.lights[i];
+        for (std::size_t i = 0; i < job.lights.size(); ++i) {
+            const MaskLight& light = job.lights[i];
             Mask mask = run.of(i, frame);
-            mean.add(mask.visibility, light.weight);
-            add_report(report, mask.report, light.name, scene.warnings);
+            if (job.combined) {
+                mean.add(mask.visibility, light.weight);
+                add_report(report, mask.report, light.name, job.warnings);
+            }
             sink({.light = light.name, .frame = frame, .mask = std::move(mask)});
         }
-        sink(together(mean, std::move(report), frame));
+        if (job.combined) sink(together(mean, std::move(report), frame));
     }
+}
+
+void Engine::prepare(const MaskJob& job, const MaskHooks& hooks) const
+{
+    MaskRun run(*this, job, hooks);
+    for (std::size_t i = 0; i < job.lights.size(); ++i) run.prepare(i, run.frames() > 0 ? 1 : 0);
 }
 
 } // namespace penumbra

@@ -11,15 +11,6 @@
 
 namespace penumbra {
 
-constexpr std::size_t max_frames = 4096; // of a sequence
-constexpr std::size_t max_lights = 256;  // of a scene
-
-// How many frames the light's sequence has; 0: it has none.
-std::size_t frames_of(const Light& light);
-
-// The light as it shines in that frame, counted from 1: without its sequence, which is not copied.
-Light at_frame(const Light& light, int frame);
-
 // Throws invalid_input, naming the key, for a list that is too long, names that are no names or stand twice, weights that are negative, not
 // finite or all 0.
 void validate_names(std::span<const SceneLight> lights);

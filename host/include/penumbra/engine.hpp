@@ -118,6 +118,9 @@ struct DeviceOccluders {
     cl_mem back = nullptr;
 };
 
+struct MaskJob;
+struct MaskHooks;
+
 // Safe to use from several threads at once.
 class PENUMBRA_API Engine {
 public:
@@ -142,6 +145,12 @@ public:
     std::vector<NamedMask> masks(const Scene& scene) const; // by scene.technique
     std::vector<NamedMask> masks(const Scene& scene, const Technique& technique) const;
     void masks(const Scene& scene, const Technique& technique, const MaskSink& sink) const;
+
+    // The same run of a job, with hooks (mask_job.hpp): for each frame one mask of each light, and then that of all together where the scene
+    // has a list of them.
+    void masks(const MaskJob& job, const MaskHooks& hooks, const MaskSink& sink) const;
+    // Prepares all the job's lights, for its keeper; of a sequence its first frame.
+    void prepare(const MaskJob& job, const MaskHooks& hooks) const;
 
     // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs objects: the second or the third.
     // What the technique needs and `occluders` lack is rendered from the objects.

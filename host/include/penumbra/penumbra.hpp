@@ -16,6 +16,7 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
+#include <penumbra/mask_job.hpp>
 #include <penumbra/metrics.hpp>
 #include <penumbra/scene.hpp>
 #include <penumbra/technique.hpp>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -172,6 +173,15 @@ struct Scene {
 // Reads a scene file (JSON, version 1) and every image and mesh that it names, relative to the file.
 // Throws Error naming file and key: not_found, invalid_input, too_large.
 PENUMBRA_API Scene load_scene(const std::string& path);
+
+constexpr std::size_t max_frames = 4096; // of a sequence
+constexpr std::size_t max_lights = 256;  // of a scene
+
+// How many frames the light's sequence has; 0: it has none.
+PENUMBRA_API std::size_t frames_of(const Light& light);
+
+// The light as it shines in that frame, counted from 1: without its sequence, which is not copied.
+PENUMBRA_API Light at_frame(const Light& light, int frame);
 
 // How many frames the scene's sequence has; 0 when no light has one.
 PENUMBRA_API int frame_count(const Scene& scene);
