@@ -14,11 +14,11 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
-#include "descriptors.hpp"
-#include "notify.hpp"
+#include "http/service.hpp"
 #include "opencl/quirks.hpp"
-#include "options.hpp"
-#include "service.hpp"
+#include "process/descriptors.hpp"
+#include "process/notify.hpp"
+#include "process/options.hpp"
 
 namespace penumbra::server {
 namespace {
