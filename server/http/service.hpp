@@ -12,7 +12,6 @@
 #include <penumbra/engine.hpp>
 
 #include "http/metrics.hpp"
-#include "http/multipart.hpp"
 #include "masks/scene_store.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"

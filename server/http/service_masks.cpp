@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "http/answer.hpp"
+#include "http/multipart.hpp"
 #include "http/service_http.hpp"
 #include "masks/mask_format.hpp"
 #include "masks/masks.hpp"

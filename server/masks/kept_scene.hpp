@@ -12,11 +12,11 @@
 
 #include <penumbra/engine.hpp>
 
-#include "http/multipart.hpp"
 #include "io/json_value.hpp"
 #include "io/scene_file.hpp"
 #include "masks/mask_cache.hpp"
 #include "masks/masks.hpp"
+#include "masks/part.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
 

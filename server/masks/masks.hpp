@@ -10,10 +10,10 @@
 
 #include <penumbra/engine.hpp>
 
-#include "http/multipart.hpp"
 #include "masks/mask_cache.hpp"
 #include "masks/mask_choice.hpp"
 #include "masks/mask_format.hpp"
+#include "masks/part.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
 

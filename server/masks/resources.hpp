@@ -7,8 +7,8 @@
 
 #include <penumbra/error.hpp>
 
-#include "http/multipart.hpp"
 #include "io/scene_file.hpp"
+#include "masks/part.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
 
