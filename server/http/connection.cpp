@@ -12,24 +12,14 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "process/wait.hpp"
+
 namespace penumbra::server {
 namespace {
 
 thread_local Connection* served = nullptr;
 
 constexpr std::size_t read_bytes = 65536; // at a time
-
-// Waits until the socket can be read, or the time is up.
-void wait_for_bytes(socket_t socket, Deadline::Clock::time_point end)
-{
-    for (;;) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Deadline::Clock::now()).count();
-        if (left <= 0) return;
-        pollfd entry{socket, POLLIN, 0};
-        const int ready = ::poll(&entry, 1, static_cast<int>(std::min<long>(left, 1 << 30)));
-        if (ready >= 0 || errno != EINTR) return;
-    }
-}
 
 using NameCall = int (*)(int, sockaddr*, socklen_t*);
 
@@ -91,7 +81,7 @@ std::size_t Connection::receive(char* to, std::size_t size)
         if (got > 0) return static_cast<std::size_t>(got);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
-            wait_for_bytes(socket_, std::min(lobby_.limits().transfer_end(body_begun_, body_bytes_), request_.end()));
+            wait_for(socket_, POLLIN, std::min(lobby_.limits().transfer_end(body_begun_, body_bytes_), request_.end()));
         else
             ended_ = true;
     }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -78,6 +79,9 @@ private:
     using Guests = std::unordered_map<int, Guest>;
 
     void run();
+    void wake();
+    Clock::time_point end_of(const Guest& guest) const;
+    void begin_phase(Guests::iterator guest, Phase phase, bool watched);
     void move_on(Guests::iterator guest);
     void read_headers(Guests::iterator guest);
     void send(Guests::iterator guest);
@@ -86,18 +90,21 @@ private:
     void hand_over(Guests::iterator guest, bool timed_out, bool ended);
     void end_late(Clock::time_point now);
     bool make_room();
+    static Clock::time_point may_go(const Guest& guest);
+    Clock::time_point next_room() const;
     void give_up_an_answer();
     void close(Guests::iterator guest);
-    void watch(int socket, Phase phase, bool already);
-    bool any(Phase phase) const;
+    void watch(int socket, Phase phase, bool watched);
 
     const LobbyLimits limits_;
     const Serve serve_;
-    const int events_;
+    const int events_, wake_; // an epoll descriptor, and an eventfd in its set
     mutable std::mutex mutex_;
+    std::condition_variable changed_; // a guest left, was handed over, or began another phase
     Guests guests_;
-    std::size_t served_ = 0;          // handed over and not back
-    std::uint64_t waiting_bytes_ = 0; // of answers
+    Clock::time_point next_end_ = Clock::time_point::max(); // no guest's time is up before
+    std::size_t served_ = 0;                                // handed over and not back
+    std::uint64_t waiting_bytes_ = 0;                       // of answers
     bool ending_ = false;
     std::thread thread_;
 };

@@ -15,6 +15,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "process/wait.hpp"
+
 namespace penumbra::server {
 namespace {
 
@@ -58,19 +60,6 @@ socklen_t address_of(const std::string& name, sockaddr_un& address)
 }
 
 // --- The health check --------------------------------------------------------------------------------------------------------------
-
-// Waits until the socket is ready for `events`.
-bool wait_for(int socket, short events, Clock::time_point end)
-{
-    for (;;) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count();
-        if (left <= 0) return false;
-        pollfd entry{socket, events, 0};
-        const int ready = ::poll(&entry, 1, static_cast<int>(std::min<std::int64_t>(left, 1 << 30)));
-        if (ready > 0) return true;
-        if (ready < 0 && errno != EINTR) return false;
-    }
-}
 
 bool connects(int socket, const addrinfo& to, Clock::time_point end)
 {
