@@ -29,7 +29,7 @@ foreach(file IN LISTS files)
 endforeach()
 
 file(WRITE ${OUTPUT} "// Made from clients/web/ by cmake/embed_page.cmake.
-#include \"page.hpp\"
+#include \"http/page.hpp\"
 
 namespace penumbra::server {
 namespace {

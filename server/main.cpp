@@ -14,10 +14,10 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
-#include "descriptors.hpp"
-#include "notify.hpp"
-#include "options.hpp"
-#include "service.hpp"
+#include "http/service.hpp"
+#include "process/descriptors.hpp"
+#include "process/notify.hpp"
+#include "process/options.hpp"
 
 namespace penumbra::server {
 namespace {

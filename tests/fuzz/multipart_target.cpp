@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "fuzz/target.hpp"
-#include "multipart.hpp"
-#include "problem.hpp"
+#include "http/multipart.hpp"
+#include "process/problem.hpp"
 
 using namespace penumbra::server;
 using penumbra::fuzz::expect;

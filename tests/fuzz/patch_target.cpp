@@ -6,9 +6,9 @@
 #include "fuzz/samples.hpp"
 #include "fuzz/target.hpp"
 #include "io/json_value.hpp"
-#include "kept_scene.hpp"
-#include "problem.hpp"
-#include "scene_patch.hpp"
+#include "masks/kept_scene.hpp"
+#include "masks/scene_patch.hpp"
+#include "process/problem.hpp"
 
 using namespace penumbra;
 using namespace penumbra::server;

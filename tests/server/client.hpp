@@ -21,8 +21,8 @@
 
 #include <penumbra/engine.hpp>
 
+#include "http/service.hpp"
 #include "io/image_io.hpp"
-#include "service.hpp"
 #include "support/maps.hpp"
 
 namespace penumbra::test {

@@ -1,0 +1,93 @@
+// The HTTP service: routes, refusals, readiness, and a graceful end.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <penumbra/engine.hpp>
+
+#include "http/metrics.hpp"
+#include "masks/scene_store.hpp"
+#include "process/gate.hpp"
+#include "process/options.hpp"
+
+namespace httplib {
+struct Request;
+struct Response;
+} // namespace httplib
+
+namespace penumbra::server {
+
+struct Route;
+class Body;
+
+class Service {
+public:
+    using Log = std::function<void(std::string_view line)>; // called from many threads
+    Service(Options options, Engine engine, Log log);
+    ~Service();
+
+    // Binds; gives the port. Throws usage when the address cannot be had.
+    int bind();
+    // Checks the device and warms every technique; then /readyz says ready. Throws what they throw.
+    void become_ready();
+    // Answers until stop(); returns when what was in flight is done.
+    void serve();
+    // From now on /readyz says 503.
+    void drain();
+    // Takes no more connections. May be called from any thread, before serve() too.
+    void stop();
+
+    Gate& gate() { return gate_; }
+
+private:
+    class Http;
+    using Request = httplib::Request;
+    using Response = httplib::Response;
+
+    // service_checks.cpp: throw Problem for what is refused before its body is read.
+    void check(const Request& request) const;
+    void check_browser(const Request& request) const;
+    void check_token(const Request& request) const;
+    void check_body_headers(const Request& request, const Route& route) const;
+
+    // service_masks.cpp: what computes.
+    Body read_body(const Request& request) const;
+    void post_mask(const Request& request, Response& response);
+    void post_scene(const Request& request, Response& response);
+    void post_kept_mask(const Request& request, Response& response);
+    void get_scene(const Request& request, Response& response);
+    void delete_scene(const Request& request, Response& response);
+    Gate::Guard enter_slot();
+    void send_mask(Response& response, const MaskTask& task, const MaskFormat& format);
+    std::string describe(const KeptScene& scene);
+
+    // service_routes.cpp
+    void set_routes();
+    void set_documents();
+    void ready(Response& response) const;
+    std::string metrics_text();
+    void finished(const Request& request, const Response& response);
+
+    const Options options_;
+    const Engine engine_;
+    const Log log_;
+    Gate gate_;
+    SceneStore scenes_;
+    mutable Metrics metrics_;
+    const std::string id_prefix_;
+    std::atomic<bool> warm_ = false, draining_ = false, stopped_ = false;
+    std::atomic<std::uint64_t> requests_ = 0, peak_device_bytes_ = 0;
+    const double started_s_;
+    std::unique_ptr<Http> http_;
+};
+
+// Whether both are the same; takes as long for any `given` of one length.
+bool same_secret(std::string_view given, std::string_view expected);
+
+} // namespace penumbra::server

@@ -1,0 +1,46 @@
+// The HTTP library, with connections of our own (connection.hpp). Only the service's own files see it.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <httplib.h>
+
+#include "http/connection.hpp"
+#include "http/service.hpp"
+
+namespace penumbra::server {
+
+class Service::Http final : public httplib::Server {
+public:
+    explicit Http(Service& service);
+    void lengthen_backlog();
+
+private:
+    class Reception;
+    bool process_and_close_socket(socket_t socket) override;
+    void serve(Lobby& lobby, Arrival arrival);
+    // After the headers are read, before anything is decided.
+    void begin(httplib::Request& request, Connection& connection);
+
+    Service& service_;
+    Lobby* lobby_ = nullptr; // while it serves
+};
+
+// A Content-Length; nothing when it is no number.
+inline std::optional<std::uint64_t> length_from(const std::string& text)
+{
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (text.empty() || error != std::errc{} || end != text.data() + text.size()) return {};
+    return value;
+}
+
+inline double seconds_since(Deadline::Clock::time_point begin)
+{
+    return std::chrono::duration<double>(Deadline::Clock::now() - begin).count();
+}
+
+} // namespace penumbra::server

@@ -1,0 +1,209 @@
+// The calls that compute: masks of scenes that come along, and of scenes that are kept.
+#include <algorithm>
+#include <future>
+#include <optional>
+
+#include <nlohmann/json.hpp>
+
+#include "http/answer.hpp"
+#include "http/multipart.hpp"
+#include "http/service_http.hpp"
+#include "masks/mask_format.hpp"
+#include "masks/masks.hpp"
+#include "masks/work_limits.hpp"
+
+namespace penumbra::server {
+namespace {
+
+Problem no_scene()
+{
+    return Problem(404, "no_scene", "there is no scene of this id, or it is kept no longer; POST /v1/scenes keeps it again");
+}
+
+MaskChoice choice_of(const httplib::Request& request) { return choice_from({request.params.begin(), request.params.end()}); }
+
+// The id in the path, which the checks have looked at.
+std::string_view id_in(const httplib::Request& request)
+{
+    constexpr std::size_t before = sizeof("/v1/scenes/") - 1;
+    return std::string_view(request.path).substr(before, 64);
+}
+
+// The entity tag of a mask, made beside what else is to be done: SHA-256 takes a millisecond or more for the two megabytes of a pair of
+// maps. Waits for its end when it goes.
+class Tag {
+public:
+    // `make` gives the tag; what it refers to outlives this. Few bytes are done sooner than a thread has started (some 50 us).
+    template <class Make> Tag(std::size_t bytes, Make make)
+        : tag_(std::async(bytes < 65536 ? std::launch::deferred : std::launch::async | std::launch::deferred, std::move(make)))
+    {
+    }
+
+    // Whether the client has that mask already; then the answer is 304.
+    bool is_known(const httplib::Request& request, httplib::Response& response) const
+    {
+        if (!request.has_header("If-None-Match") || !names_tag(request.get_header_value("If-None-Match"), tag_.get())) return false;
+        set_on(response);
+        response.status = 304;
+        return true;
+    }
+    void set_on(httplib::Response& response) const
+    {
+        response.set_header("ETag", tag_.get());
+        response.set_header("Cache-Control", "private, no-cache");
+    }
+
+private:
+    std::shared_future<std::string> tag_;
+};
+
+} // namespace
+
+// The body, whole, as long as announced. It goes past the HTTP library's reader, which copies it twice.
+Body Service::read_body(const Request& request) const
+{
+    Connection& connection = Connection::current();
+    const auto uploading = Deadline::Clock::now();
+    const std::size_t length = static_cast<std::size_t>(length_from(request.get_header_value("Content-Length")).value_or(0));
+    Body body(length);
+    const std::size_t came = connection.read_body(body.data(), length);
+    if (connection.too_slow())
+        throw Problem(408, "slow_body",
+                      "the body came at less than " + std::to_string(options_.transfer_bytes_s) + " bytes a second, " +
+                          std::to_string(transfer_grace.count()) + " s after its begin");
+    if (connection.timed_out())
+        throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
+    if (came != length)
+        throw Problem(400, "short_body", "the body ended after " + std::to_string(came) + " of " + std::to_string(length) + " bytes");
+    const double upload_s = seconds_since(uploading);
+    connection.cost.bytes_in = length;
+    connection.cost.upload_ms = upload_s * 1000;
+    metrics_.observe("penumbra_upload_seconds", "", upload_s);
+    return body;
+}
+
+Gate::Guard Service::enter_slot()
+{
+    const auto waiting = Deadline::Clock::now();
+    Gate::Guard slot = gate_.enter(Connection::current().request());
+    const double wait_s = seconds_since(waiting);
+    Connection::current().cost.queue_ms = wait_s * 1000;
+    metrics_.observe("penumbra_queue_wait_seconds", "", wait_s);
+    return slot;
+}
+
+void Service::post_mask(const Request& request, Response& response)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const MaskChoice choice = choice_of(request);
+    const Body body = read_body(request);
+    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+    const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), choice, format); });
+    if (tag.is_known(request, response)) return;
+
+    const auto slot = enter_slot();
+    const auto decoding = Deadline::Clock::now();
+    const MaskTask task = task_of(parts, choice, options_, connection.request());
+    connection.cost.decode_ms = seconds_since(decoding) * 1000;
+    send_mask(response, task, format);
+    tag.set_on(response);
+}
+
+void Service::post_scene(const Request& request, Response& response)
+{
+    if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const Body body = read_body(request);
+    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+    const std::string id = id_of(parts);
+    auto scene = scenes_.find(id, true);
+    response.status = scene ? 200 : 201;
+    if (!scene) {
+        const auto slot = enter_slot();
+        const auto decoding = Deadline::Clock::now();
+        scene = std::make_shared<KeptScene>(id, parts, options_, connection.request());
+        const MaskTask task = scene->task({}, {}, scene->first_choice(), options_, connection.request());
+        connection.cost.decode_ms = seconds_since(decoding) * 1000;
+        check_work(task, options_);
+        prepare_all(engine_, task, connection.request());
+        scenes_.keep(scene);
+    }
+    response.set_header("Location", "/v1/scenes/" + id);
+    response.set_content(describe(*scene), "application/json");
+}
+
+void Service::post_kept_mask(const Request& request, Response& response)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const auto scene = scenes_.find(id_in(request), true);
+    if (!scene) throw no_scene();
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
+    const MaskChoice choice = choice_of(request);
+    const Body body = read_body(request);
+    std::vector<Part> parts;
+    std::string_view patch = body;
+    if (body.size() > 0 && !is_json(connection.content_type)) {
+        parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+        const Part* const part = find_scene(parts, options_);
+        patch = part ? part->bytes : std::string_view();
+    }
+    const Tag tag(body.size(), [&] { return etag_of(engine_, scene->content_of(patch, parts), choice, format); });
+    if (tag.is_known(request, response)) return;
+
+    const auto slot = enter_slot();
+    const auto decoding = Deadline::Clock::now();
+    const MaskTask task = scene->task(patch, parts, choice, options_, connection.request());
+    connection.cost.decode_ms = seconds_since(decoding) * 1000;
+    send_mask(response, task, format);
+    tag.set_on(response);
+    scenes_.tidy();
+}
+
+void Service::send_mask(Response& response, const MaskTask& task, const MaskFormat& format)
+{
+    RequestCost& cost = Connection::current().cost;
+    MaskReply reply = compute_mask(engine_, task, format, options_, Connection::current().request());
+    cost.technique = reply.technique;
+    cost.compute_ms = reply.compute_ms;
+    cost.encode_ms = reply.encode_ms;
+    metrics_.observe("penumbra_decode_seconds", "", cost.decode_ms / 1000);
+    metrics_.observe("penumbra_compute_seconds", "technique=\"" + reply.technique + "\"", cost.compute_ms / 1000);
+    metrics_.observe("penumbra_encode_seconds", "format=\"" + std::string(format.format) + "\"", cost.encode_ms / 1000);
+    metrics_.count("penumbra_pixels_total", "", static_cast<double>(reply.pixels));
+    std::uint64_t peak = peak_device_bytes_;
+    while (reply.device_bytes > peak && !peak_device_bytes_.compare_exchange_weak(peak, reply.device_bytes)) {
+    }
+
+    reply.stages.insert(reply.stages.begin(), {{"upload", cost.upload_ms}, {"queue", cost.queue_ms}, {"decode", cost.decode_ms}});
+    response.status = 200;
+    response.set_header("Server-Timing", server_timing(reply.stages));
+    if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
+    response.body = std::move(reply.bytes);
+    response.set_header("Content-Type", std::string(format.media_type));
+}
+
+std::string Service::describe(const KeptScene& scene)
+{
+    const nlohmann::ordered_json json = {
+        {"id", scene.id()}, {"expires_s", scenes_.seconds_left(scene.id())}, {"bytes", scene.bytes()}, {"warnings", scene.warnings()}};
+    return json.dump(2, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+void Service::get_scene(const Request& request, Response& response)
+{
+    const auto scene = scenes_.find(id_in(request), false);
+    if (!scene) throw no_scene();
+    response.set_content(describe(*scene), "application/json");
+}
+
+void Service::delete_scene(const Request& request, Response& response)
+{
+    if (!scenes_.forget(id_in(request))) throw no_scene();
+    response.status = 204;
+}
+
+} // namespace penumbra::server
