@@ -109,11 +109,11 @@ void KeptScene::check_objects(const Changes& changes) const
     const auto objects = changes.after.find("objects");
     if (objects == changes.after.end()) return;
     if (mentions(*objects, changes.names))
-        throw Error(ErrorCode::invalid_input, "objects: name a part that came with this request, and objects are kept as they are",
-                    "give the part another name, or upload the scene anew");
+        throw Error::at(ErrorCode::invalid_input, "objects", "name a part that came with this request, and objects are kept as they are",
+                        "give the part another name, or upload the scene anew");
     if (!changes.same_lights() && objects_follow_light(changes.after))
-        throw Error(ErrorCode::invalid_input, "light: cannot be changed: the depth of an object is seen from the light itself",
-                    "give that object a camera of kind pinhole, or upload the scene anew");
+        throw Error::at(ErrorCode::invalid_input, "light", "cannot be changed: the depth of an object is seen from the light itself",
+                        "give that object a camera of kind pinhole, or upload the scene anew");
 }
 
 std::shared_ptr<const KeptScene::Lights> KeptScene::lights_of(Scene& scene)
@@ -191,27 +191,25 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
                   .warnings = scene_.warnings,
                   .cache = &cache_,
                   .receivers_key = changes.text("receivers")};
-    resources.without_paths([&] {
-        const JsonObject root(JsonValue(after, {}));
-        if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
-        if (!changes.same("technique"))
-            task.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
+    const JsonObject root(JsonValue(after, {}));
+    if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
+    if (!changes.same("technique"))
+        task.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
 
-        const bool same_lights = changes.same_lights() && changes.same("occluders");
-        const auto lights = same_lights ? lights_ : patched_lights(changes, root, resources, task.warnings);
-        const Light& first = lights->list.front().light;
-        const bool same_cameras = is_directional(first) == is_directional(lights_->list.front().light);
-        check_shared_views(root);
-        if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
-            task.receivers = std::make_shared<const Receivers>(
-                root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.warnings) : Receivers{});
+    const bool same_lights = changes.same_lights() && changes.same("occluders");
+    const auto lights = same_lights ? lights_ : patched_lights(changes, root, resources, task.warnings);
+    const Light& first = lights->list.front().light;
+    const bool same_cameras = is_directional(first) == is_directional(lights_->list.front().light);
+    check_shared_views(root);
+    if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
+        task.receivers = std::make_shared<const Receivers>(
+            root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.warnings) : Receivers{});
 
-        task.lights = chosen(changes, *lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice);
-        if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
-        // Seen from the light, or fitted by it, the receivers depend on it.
-        if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
-            task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
-    });
+    task.lights = chosen(changes, *lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice);
+    if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
+    // Seen from the light, or fitted by it, the receivers depend on it.
+    if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
+        task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
     return task;
 }
 
