@@ -7,6 +7,7 @@
 
 #include "digest.hpp"
 #include "io/json_value.hpp"
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "problem.hpp"
 #include "resources.hpp"
@@ -71,7 +72,7 @@ struct KeptScene::Changes {
     {
         const auto a = before.find(section), b = after.find(section);
         if ((a == before.end()) != (b == after.end())) return false;
-        return a == before.end() || (*a == *b && !mentions(*b, names));
+        return a == before.end() || (*a == *b && !names_file(*b, section, names));
     }
     bool same_lights() const { return same("light") && same("lights"); }
     std::string text(const char* section) const { return after.contains(section) ? after[section].dump() : std::string(); }
@@ -108,7 +109,7 @@ void KeptScene::check_objects(const Changes& changes) const
     if (geometry_.objects().empty()) return;
     const auto objects = changes.after.find("objects");
     if (objects == changes.after.end()) return;
-    if (mentions(*objects, changes.names))
+    if (names_file(*objects, "objects", changes.names))
         throw Error::at(ErrorCode::invalid_input, "objects", "name a part that came with this request, and objects are kept as they are",
                         "give the part another name, or upload the scene anew");
     if (!changes.same_lights() && objects_follow_light(changes.after))
@@ -161,7 +162,7 @@ std::vector<TaskLight> KeptScene::chosen(const Changes& changes, const Lights& l
                        .occluders = light.own ? light.own : lights.shared,
                        .key = json.dump() + '\n' + changes.text("technique"),
                        .still_key = {}};
-        if (!same_occluders || mentions(json, changes.names)) task.key.clear();
+        if (!same_occluders || names_file(json, light.name.empty() ? "light" : "lights[]", changes.names)) task.key.clear();
         if (choosable[i].frames > 0 && !task.key.empty()) {
             task.still_key = task.key;
             task.key += "\nframe " + std::to_string(choice.frame);
@@ -206,7 +207,8 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
             root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.warnings) : Receivers{});
 
     task.lights = chosen(changes, *lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice);
-    if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
+    if (!changes.same("receivers") && names_file(after.value("receivers", nlohmann::json()), "receivers", changes.names))
+        task.receivers_key.clear();
     // Seen from the light, or fitted by it, the receivers depend on it.
     if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.receivers->camera))
         task.receivers_key += '\n' + changes.text("light") + changes.text("lights");

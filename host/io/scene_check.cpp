@@ -53,6 +53,19 @@ struct Check {
     void operator()(const Technique&) const {}
 };
 
+// The same, for the rest of a place of files.
+bool named_at(const nlohmann::json& value, std::string_view place, std::span<const std::string_view> names)
+{
+    if (place.starts_with('.')) place.remove_prefix(1);
+    if (place.empty()) return value.is_string() && std::ranges::find(names, value.get_ref<const std::string&>()) != names.end();
+    if (place.starts_with("[]"))
+        return value.is_array() &&
+               std::ranges::any_of(value, [&](const nlohmann::json& element) { return named_at(element, place.substr(2), names); });
+    const std::size_t end = std::min(place.find_first_of(".["), place.size());
+    const auto member = value.is_object() ? value.find(place.substr(0, end)) : value.end();
+    return member != value.end() && named_at(*member, place.substr(end), names);
+}
+
 } // namespace
 
 JsonObject checked(const JsonValue& value, const Form& form)
@@ -73,6 +86,15 @@ JsonObject checked(const JsonValue& value, const scene_file::Object& object) { r
 std::size_t kind_index(const JsonValue& value, const scene_file::Object& object)
 {
     return JsonObject(value).need("kind").choice(kinds_of(object));
+}
+
+bool names_file(const nlohmann::json& value, std::string_view at, std::span<const std::string_view> names)
+{
+    return std::ranges::any_of(file_places(), [&](std::string_view place) {
+        if (!place.starts_with(at)) return false;
+        place.remove_prefix(at.size());
+        return (place.empty() || place.starts_with('.') || place.starts_with('[')) && named_at(value, place, names);
+    });
 }
 
 } // namespace penumbra

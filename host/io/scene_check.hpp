@@ -16,4 +16,7 @@ JsonObject checked(const JsonValue& value, const scene_file::Object& object);
 // Which of the object's kinds it is, by its place in kinds_of.
 std::size_t kind_index(const JsonValue& value, const scene_file::Object& object);
 
+// Whether a file of one of these names is named in `value`, which stands at that place of the scene ("light", "lights", "lights[]").
+bool names_file(const nlohmann::json& value, std::string_view at, std::span<const std::string_view> names);
+
 } // namespace penumbra

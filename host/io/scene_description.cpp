@@ -269,7 +269,8 @@ const Object& scene()
                     .type = One{output},
                     .meaning = "format of the mask",
                     .otherwise = "by the mask's file name",
-                    .example = R"({"format": "exr"})"}}}}};
+                    .example = R"({"format": "exr"})"}},
+          .exactly_one = {"light", "lights"}}}};
     return object;
 }
 

@@ -73,6 +73,7 @@ struct Form {
     std::string_view of;   // what an unknown key is no key of: "of a rectangle"; empty: nothing is said
     std::string_view meaning;
     std::vector<Key> keys;
+    std::vector<std::string_view> exactly_one = {}; // of these keys
 };
 
 struct Object {
@@ -116,6 +117,6 @@ std::string expected(const Number& number);
 std::string expected(const OneOfIntegers& integers);
 
 // Where file names stand: "lights[].emission[]", [] being each element of a list.
-std::vector<std::string> file_places();
+const std::vector<std::string>& file_places();
 
 } // namespace penumbra::scene_file

@@ -308,11 +308,14 @@ std::string expected(const OneOfIntegers& integers)
     return "one of " + list;
 }
 
-std::vector<std::string> file_places()
+const std::vector<std::string>& file_places()
 {
-    std::vector<std::string> places;
-    add_places(scene(), "", places);
-    return places;
+    static const std::vector<std::string> all = [] {
+        std::vector<std::string> places;
+        add_places(scene(), "", places);
+        return places;
+    }();
+    return all;
 }
 
 } // namespace penumbra::scene_file
