@@ -50,7 +50,7 @@ struct Check {
     }
     void operator()(const One&) const {}
     void operator()(const List&) const {}
-    void operator()(const Technique&) const {}
+    void operator()(const TechniqueKeys&) const {}
 };
 
 // The same, for the rest of a place of files.

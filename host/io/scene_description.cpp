@@ -261,7 +261,7 @@ const Object& scene()
                     .fallback = "{}",
                     .example = R"({"depth": "receiver.exr"})"},
                    {.name = "technique",
-                    .type = Technique{},
+                    .type = TechniqueKeys{},
                     .meaning = "how the mask is computed",
                     .fallback = R"({"kind": "soft_shadow_map"})",
                     .example = R"({"kind": "ray_traced"})"},

@@ -50,9 +50,9 @@ struct List { // of objects
     const Object& (*object)();
     std::size_t low, high;
 };
-struct Technique {}; // a kind of technique_table() and its settings
+struct TechniqueKeys {}; // a kind of technique_table() and its settings
 
-using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, Pair, Size, One, List, Technique>;
+using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, Pair, Size, One, List, TechniqueKeys>;
 
 // --- Keys, forms, objects --------------------------------------------------------------------------------------------------------
 

@@ -74,7 +74,7 @@ struct TypeSchema {
     Json operator()(const Size& size) const { return array_of({{"type", "integer"}, {"minimum", size.low}, {"maximum", size.high}}, 2, 2); }
     Json operator()(const One& one) const { return reference(one.object().name); }
     Json operator()(const List& list) const { return array_of(reference(list.object().name), list.low, list.high); }
-    Json operator()(const Technique&) const { return reference("technique"); }
+    Json operator()(const TechniqueKeys&) const { return reference("technique"); }
 };
 
 Json schema_of(const Key& key, std::string_view prefix)

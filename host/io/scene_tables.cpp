@@ -61,7 +61,7 @@ struct TypeWords {
     }
     std::string operator()(const One& one) const { return link_to(one.object().name); }
     std::string operator()(const List& list) const { return count_words(list.low, list.high, link_to(list.object().name)); }
-    std::string operator()(const Technique&) const { return link_to("technique"); }
+    std::string operator()(const TechniqueKeys&) const { return link_to("technique"); }
 };
 
 std::string type_words(const Key& key)

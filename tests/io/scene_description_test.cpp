@@ -31,7 +31,7 @@ struct Place {
 // Where the directory of the tests has a mesh, names lead to it; what it is does not matter here.
 class AnyFile : public MemoryResources {
 public:
-    AnyFile() : MemoryResources(parts()) {}
+    AnyFile() : MemoryResources(test::parts()) {}
     Bytes bytes(const std::string& name) const override
     {
         return MemoryResources::bytes(name == "emission.exr" ? "light.exr" : "depth.exr");
