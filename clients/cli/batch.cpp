@@ -135,7 +135,7 @@ private:
             compute(item);
             outcome.status = Status::done;
         } catch (const Error& error) {
-            fail(outcome, error.message().starts_with(item.scene) ? error : error.within(item.scene));
+            fail(outcome, error.within(item.scene));
         } catch (const std::bad_alloc&) {
             fail(outcome, Error(ErrorCode::too_large, item.scene + ": out of memory"));
         } catch (const std::exception& error) {

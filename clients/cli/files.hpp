@@ -39,13 +39,13 @@ void write_text(const std::string& path, std::string_view text);
 // load_scene, the errors of which name the file.
 Scene read_scene(const std::string& path);
 
-// Runs `work`; errors about the input get the scene's path in front, unless it stands there already.
+// Runs `work`; errors about the input have their place in the scene's file.
 template <class Work> auto in_scene(const std::string& path, const Work& work)
 {
     try {
         return work();
     } catch (const Error& error) {
-        if (exit_code(error.code()) != 2 || error.message().starts_with(path)) throw;
+        if (exit_code(error.code()) != 2) throw;
         throw error.within(path);
     }
 }

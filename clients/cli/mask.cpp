@@ -45,7 +45,7 @@ void write_report(const Flags& flags, const std::string& report)
     try {
         write_text(flags.report, report);
     } catch (const Error& error) {
-        throw Error(error.code(), flags.mask + " is written, but its report is not: " + error.message(), error.hint());
+        throw error.within(flags.mask + " is written, but its report is not");
     }
 }
 

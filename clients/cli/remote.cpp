@@ -74,9 +74,9 @@ Error translated(const client::Error& error, const RemoteScene& asked)
     const std::string service = "--server " + asked.server + ": ";
     switch (problem.status) {
     case 422:
-        return Error(ErrorCode::invalid_input, asked.scene + ": " + problem.detail);
+        return Error(ErrorCode::invalid_input, problem.detail).within(asked.scene);
     case 413:
-        return Error(ErrorCode::too_large, asked.scene + ": " + problem.detail);
+        return Error(ErrorCode::too_large, problem.detail).within(asked.scene);
     case 401:
         return Error(ErrorCode::usage, service + problem.detail, "the token goes into PENUMBRA_SERVER_TOKEN");
     case 408:

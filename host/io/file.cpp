@@ -79,15 +79,18 @@ void write_through(const std::string& path, std::span<const std::byte> bytes)
 
 std::vector<std::byte> read_file(const std::string& path, std::string_view where)
 {
+    // A file that goes by its path is the place of the error; one that a scene names is told by that name.
     const std::string subject(where.empty() ? std::string_view(path) : where);
-    const std::string hint = subject == path ? std::string() : "looked for " + path;
+    const auto failure = [&](ErrorCode code, const std::string& what) {
+        return subject == path ? Error(code, what).within(path) : Error(code, subject + ": " + what, "looked for " + path);
+    };
     const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (in.fd < 0 && (errno == ENOENT || errno == ENOTDIR)) throw Error(ErrorCode::not_found, subject + ": no such file", hint);
-    if (in.fd < 0) throw Error(ErrorCode::not_found, subject + ": cannot be opened: " + system_text(errno), hint);
+    if (in.fd < 0 && (errno == ENOENT || errno == ENOTDIR)) throw failure(ErrorCode::not_found, "no such file");
+    if (in.fd < 0) throw failure(ErrorCode::not_found, "cannot be opened: " + system_text(errno));
 
     struct stat status = {};
-    if (::fstat(in.fd, &status) != 0) throw Error(ErrorCode::not_found, subject + ": cannot be read: " + system_text(errno), hint);
-    if (S_ISDIR(status.st_mode)) throw Error(ErrorCode::not_found, subject + ": is a folder, expected a file", hint);
+    if (::fstat(in.fd, &status) != 0) throw failure(ErrorCode::not_found, "cannot be read: " + system_text(errno));
+    if (S_ISDIR(status.st_mode)) throw failure(ErrorCode::not_found, "is a folder, expected a file");
 
     // The size is only a guess: pipes have none, and a file may change under us.
     std::vector<std::byte> bytes;
@@ -97,11 +100,11 @@ std::vector<std::byte> read_file(const std::string& path, std::string_view where
         if (filled == bytes.size()) bytes.resize(bytes.size() + std::max<std::size_t>(bytes.size() / 2, 65536));
         const ssize_t count = ::read(in.fd, bytes.data() + filled, bytes.size() - filled);
         if (count < 0 && errno == EINTR) continue;
-        if (count < 0) throw Error(ErrorCode::not_found, subject + ": cannot be read: " + system_text(errno), hint);
+        if (count < 0) throw failure(ErrorCode::not_found, "cannot be read: " + system_text(errno));
         if (count == 0) break;
         filled += static_cast<std::size_t>(count);
         if (filled > max_file_bytes)
-            throw Error(ErrorCode::too_large, subject + ": is over the limit of " + std::to_string(max_file_bytes) + " bytes", hint);
+            throw failure(ErrorCode::too_large, "is over the limit of " + std::to_string(max_file_bytes) + " bytes");
     }
     bytes.resize(filled);
     return bytes;

@@ -96,7 +96,7 @@ json parse_json(std::string_view text)
 
 Error JsonValue::error(const std::string& message, std::string hint) const
 {
-    return {ErrorCode::invalid_input, key_.empty() ? message : key_ + ": " + message, std::move(hint)};
+    return Error::at(ErrorCode::invalid_input, key_, message, std::move(hint));
 }
 
 Error JsonValue::expected(const std::string& what) const { return error("is " + kind_of(*json_) + ", expected " + what); }
@@ -187,16 +187,6 @@ JsonObject::JsonObject(const JsonValue& value) : value_(value)
     if (!value.json().is_object()) throw value.expected("an object");
 }
 
-JsonObject::JsonObject(const JsonValue& value, std::initializer_list<std::string_view> known, std::string_view of) : JsonObject(value)
-{
-    allow_only(known, of);
-}
-
-void JsonObject::allow_only(std::initializer_list<std::string_view> known, std::string_view of) const
-{
-    allow_only(std::span(known.begin(), known.size()), of);
-}
-
 void JsonObject::allow_only(std::span<const std::string_view> known, std::string_view of) const
 {
     for (const auto& [name, member] : members()) {
@@ -217,7 +207,7 @@ std::optional<JsonValue> JsonObject::find(std::string_view key) const
 JsonValue JsonObject::need(std::string_view key) const
 {
     if (const auto found = find(key)) return *found;
-    throw Error(ErrorCode::invalid_input, joined(value_.key(), key) + ": is missing");
+    throw Error::at(ErrorCode::invalid_input, joined(value_.key(), key), "is missing");
 }
 
 std::vector<std::pair<std::string, JsonValue>> JsonObject::members() const

@@ -52,15 +52,13 @@ private:
     std::string key_;
 };
 
-// An object of which every key is known.
+// An object and its members.
 class JsonObject {
 public:
     // Throws for what is not an object.
     explicit JsonObject(const JsonValue& value);
-    // And for a key that is not in `known`, listing those; `of` says what has them ("of a sphere").
-    JsonObject(const JsonValue& value, std::initializer_list<std::string_view> known, std::string_view of = {});
 
-    void allow_only(std::initializer_list<std::string_view> known, std::string_view of = {}) const;
+    // Throws for a key that is not in `known`, listing those; `of` says what has them ("of a sphere").
     void allow_only(std::span<const std::string_view> known, std::string_view of = {}) const;
 
     const JsonValue& value() const { return value_; }

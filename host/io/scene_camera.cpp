@@ -1,8 +1,8 @@
-#include <array>
 #include <cfloat>
 #include <cmath>
 #include <numbers>
 
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "scene/camera.hpp"
 
@@ -12,16 +12,14 @@ namespace {
 
 bool is_finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-CameraSpec read_light_camera(const JsonObject& section, const Light& light)
+CameraSpec read_light_camera(const JsonObject& section, bool directional)
 {
     LightCamera camera;
-    if (std::holds_alternative<DirectionalLight>(light)) {
-        section.allow_only({"kind", "half_extent", "center"}, "of a directional light's camera, which is orthographic");
+    if (directional) {
         if (const auto half = section.find("half_extent")) camera.half_extent = half->positive_pair();
         if (const auto center = section.find("center")) camera.center = center->vec3();
         return camera;
     }
-    section.allow_only({"kind", "tan_half_fov"}, "of a light's camera (half_extent and center are for directional lights)");
     if (const auto tangents = section.find("tan_half_fov")) camera.tan_half_fov = tangents->positive_pair();
     return camera;
 }
@@ -40,7 +38,6 @@ void orthonormalize(Frame& frame)
 
 PinholeCamera read_matrix(const JsonObject& section)
 {
-    section.allow_only({"kind", "world_from_camera", "tan_half_fov"}, "beside world_from_camera");
     const JsonValue matrix = section.need("world_from_camera");
     const std::vector<double> m = matrix.numbers(16);
     if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
@@ -55,7 +52,6 @@ PinholeCamera read_matrix(const JsonObject& section)
 
 PinholeCamera read_look_at(const JsonObject& section)
 {
-    section.allow_only({"kind", "eye", "target", "up", "vertical_fov_deg"}, "beside eye and target");
     const Vec3 eye = section.need("eye").vec3();
     const JsonValue target = section.need("target");
     const Vec3 away = eye - target.vec3();
@@ -79,7 +75,6 @@ PinholeCamera read_look_at(const JsonObject& section)
 
     const JsonValue fov = section.need("vertical_fov_deg");
     const double degrees = fov.number();
-    if (!(degrees > 0 && degrees < 180)) throw fov.expected("an angle between 0 and 180 degrees");
     camera.tan_half_fov = {0, std::tan(degrees * std::numbers::pi / 360)}; // x: from the image's aspect ratio
     if (!(camera.tan_half_fov.y > 0)) throw fov.expected("an angle that is not all but 0");
     return camera;
@@ -89,14 +84,18 @@ PinholeCamera read_look_at(const JsonObject& section)
 
 CameraSpec parse_camera(const JsonValue& value, const Light& light)
 {
-    constexpr std::array<std::string_view, 2> kinds{"light", "pinhole"};
+    using namespace scene_file;
+    const std::vector<Form>& forms = camera().forms;
     const JsonObject section(value);
-    if (section.need("kind").choice(kinds) == 0) return read_light_camera(section, light);
-    if (section.has("world_from_camera")) return read_matrix(section);
+    if (kind_index(value, camera()) == 0) {
+        const bool sun = std::holds_alternative<DirectionalLight>(light);
+        return read_light_camera(checked(value, forms[sun ? sun_camera_form : light_camera_form]), sun);
+    }
+    if (section.has("world_from_camera")) return read_matrix(checked(value, forms[matrix_camera_form]));
     if (!section.has("eye"))
         throw value.error("is a pinhole without eye or world_from_camera",
                           "eye, target, up and vertical_fov_deg; or world_from_camera and tan_half_fov");
-    return read_look_at(section);
+    return read_look_at(checked(value, forms[looking_camera_form]));
 }
 
 } // namespace penumbra

@@ -1,14 +1,10 @@
-#include <array>
-
 #include "io/image_io.hpp"
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 
 namespace penumbra {
 
 namespace {
-
-constexpr std::array<std::string_view, 6> encoding_names{"planar", "radial", "disparity", "window", "reversed_window", "normalized"};
-static_assert(static_cast<int>(EncodingKind::normalized) == 5, "encoding_names are in the order of EncodingKind");
 
 constexpr std::int64_t max_resolution = 65536;
 
@@ -22,13 +18,12 @@ std::optional<Size> read_resolution(const JsonObject& section)
 {
     const auto value = section.find("resolution");
     if (!value) return {};
-    if (!value->json().is_array() || value->json().size() != 2) throw value->expected("[width, height]");
     const std::vector<JsonValue> pair = value->elements();
-    return Size{static_cast<int>(pair[0].integer(1, max_resolution)), static_cast<int>(pair[1].integer(1, max_resolution))};
+    return Size{static_cast<int>(pair[0].number()), static_cast<int>(pair[1].number())};
 }
 
-// The tangents of the half angles, which radial depth is turned into planar depth by.
-Vec2 tangents(const CameraSpec& camera, int width, int height, const std::string& where)
+// The tangents of the half angles, which radial depth is turned into planar depth by; the errors speak of the image `file`.
+Vec2 tangents(const CameraSpec& camera, int width, int height, const std::string& file)
 {
     if (const auto* pinhole = std::get_if<PinholeCamera>(&camera)) {
         const Vec2 t = pinhole->tan_half_fov;
@@ -36,10 +31,9 @@ Vec2 tangents(const CameraSpec& camera, int width, int height, const std::string
     }
     const LightCamera& light = std::get<LightCamera>(camera);
     if (light.half_extent)
-        throw Error(ErrorCode::invalid_input, where + " is radial, but its camera is orthographic and has no centre",
-                    "encoding \"planar\"");
+        throw Error(ErrorCode::invalid_input, file + " is radial, but its camera is orthographic and has no centre", "encoding \"planar\"");
     if (!light.tan_half_fov)
-        throw Error(ErrorCode::invalid_input, where + " is radial, and its camera's tan_half_fov is missing",
+        throw Error(ErrorCode::invalid_input, file + " is radial, and its camera's tan_half_fov is missing",
                     "give tan_half_fov: radial depth needs it");
     return *light.tan_half_fov;
 }
@@ -60,8 +54,8 @@ public:
         const Size own{map.width, map.height};
         if (!size_) {
             if (own.width > max_resolution || own.height > max_resolution)
-                throw Error(ErrorCode::too_large, name.key() + ": " + name.text() + " is " + text(own) + "; the limit is " +
-                                                      std::to_string(max_resolution) + " a side");
+                throw Error::at(ErrorCode::too_large, name.key(),
+                                name.text() + " is " + text(own) + "; the limit is " + std::to_string(max_resolution) + " a side");
             size_ = own;
             size_from_ = name.key();
         } else if (own.width != size_->width || own.height != size_->height) {
@@ -91,28 +85,18 @@ CameraSpec camera_of(const JsonObject& section, const Light& light)
 
 Bytes load_bytes(const JsonValue& name, const Resources& resources)
 {
-    const std::string file = name.text();
-    try {
-        return resources.bytes(file);
-    } catch (const Error& error) {
-        throw error.within(name.key());
-    }
+    return under(name, [&] { return resources.bytes(name.text()); });
 }
 
 MapEncoding parse_encoding(const JsonValue& value)
 {
-    const JsonObject section(value);
+    const std::size_t kind = kind_index(value, scene_file::encoding());
+    const JsonObject section = checked(value, scene_file::encoding().forms[kind]);
     MapEncoding result;
-    const std::size_t kind = section.need("kind").choice(encoding_names);
     result.depth.kind = static_cast<EncodingKind>(kind);
-    const std::string of = "of " + std::string(encoding_names[kind]) + " depth";
-    if (kind <= static_cast<std::size_t>(EncodingKind::disparity))
-        section.allow_only({"kind", "scale", "empty", "channel"}, of);
-    else
-        section.allow_only({"kind", "near", "far", "scale", "empty", "channel"}, of);
     if (const auto near = section.find("near")) result.depth.near = near->number();
     if (const auto far = section.find("far")) result.depth.far = far->number();
-    if (const auto scale = section.find("scale")) result.depth.scale = scale->positive();
+    if (const auto scale = section.find("scale")) result.depth.scale = scale->number();
     if (const auto empty = section.find("empty")) result.depth.empty = empty->number();
     if (const auto channel = section.find("channel")) result.channel = channel->text();
     return result;
@@ -121,21 +105,27 @@ MapEncoding parse_encoding(const JsonValue& value)
 DepthMap load_depth(const JsonValue& name, const MapEncoding& encoding, const CameraSpec& camera, const Resources& resources,
                     std::vector<std::string>& warnings)
 {
-    const std::string where = name.key() + ": " + name.text();
-    RawDepth raw = decode_raw_depth(load_bytes(name, resources), encoding.channel, where, resources.max_samples());
-    const Vec2 half = encoding.depth.kind == EncodingKind::radial ? tangents(camera, raw.width, raw.height, where) : Vec2(1, 1);
-    return decode_depth(std::move(raw), encoding.depth, half, where, warnings);
+    const std::string file = name.text();
+    const Bytes bytes = load_bytes(name, resources);
+    const std::size_t before = warnings.size();
+    DepthMap map = under(name, [&] {
+        RawDepth raw = decode_raw_depth(bytes, encoding.channel, file, resources.max_samples());
+        const Vec2 half = encoding.depth.kind == EncodingKind::radial ? tangents(camera, raw.width, raw.height, file) : Vec2(1, 1);
+        return decode_depth(std::move(raw), encoding.depth, half, file, warnings);
+    });
+    for (std::size_t i = before; i < warnings.size(); ++i) warnings[i] = name.key() + ": " + warnings[i];
+    return map;
 }
 
 Occluders parse_occluders(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)
 {
-    const JsonObject section(value, {"camera", "resolution", "depth", "encoding"});
+    const JsonObject section = checked(value, scene_file::occluders());
     Occluders occluders;
     occluders.camera = camera_of(section, light);
     MapLoader loader(section, occluders.camera, resources, warnings);
     if (const auto depth = section.find("depth")) {
         if (depth->json().is_string()) throw depth->expected("an object with front, back, layers");
-        const JsonObject maps(*depth, {"front", "back", "layers"});
+        const JsonObject maps = checked(*depth, scene_file::occluder_depth());
         if (const auto front = maps.find("front")) occluders.front = loader.load(*front);
         if (const auto back = maps.find("back")) occluders.back = loader.load(*back);
         if (const auto layers = maps.find("layers"))
@@ -150,7 +140,7 @@ Occluders parse_occluders(const JsonValue& value, const Light& light, const Reso
 
 Receivers parse_receivers(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)
 {
-    const JsonObject section(value, {"camera", "resolution", "depth", "encoding"});
+    const JsonObject section = checked(value, scene_file::receivers());
     Receivers receivers;
     receivers.camera = camera_of(section, light);
     MapLoader loader(section, receivers.camera, resources, warnings);

@@ -8,6 +8,7 @@
 #include "io/image_format.hpp"
 #include "io/image_io.hpp"
 #include "io/json_value.hpp"
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 
 namespace penumbra {
@@ -49,10 +50,10 @@ TechniqueRequest parse_technique(const JsonValue& value)
 
 OutputFormat parse_output(const JsonValue& value)
 {
-    const JsonObject section(value, {"format", "bits"});
+    const JsonObject section = checked(value, scene_file::output());
     OutputFormat output;
     output.format = section.need("format").text();
-    if (const auto bits = section.find("bits")) output.bits = static_cast<int>(bits->integer(1, 32));
+    if (const auto bits = section.find("bits")) output.bits = static_cast<int>(bits->number());
     try {
         return checked(output, {});
     } catch (const Error& error) {
@@ -70,7 +71,7 @@ Scene parse_scene(std::string_view json, const Resources& resources)
     const JsonObject root(JsonValue(document, {}));
     const JsonValue version = root.need("penumbra");
     if (!version.json().is_number_integer() || version.json() != 1) throw version.expected("1, the version of the scene file");
-    root.allow_only({"penumbra", "light", "lights", "objects", "occluders", "receivers", "technique", "output"});
+    checked(root.value(), scene_file::scene());
 
     // What is cheap to refuse comes before images and meshes.
     Scene scene;

@@ -40,10 +40,10 @@ std::vector<SceneLight> parse_light_names(const JsonValue& value)
 void parse_lights(const JsonObject& root, const Resources& resources, Scene& scene)
 {
     if (root.has("light") && root.has("lights"))
-        throw Error(ErrorCode::invalid_input, "lights: stands beside light", "expected one of the two");
+        throw Error::at(ErrorCode::invalid_input, "lights", "stands beside light", "expected one of the two");
     const auto list = root.find("lights");
     if (!list && !root.has("light"))
-        throw Error(ErrorCode::invalid_input, "light: is missing", "expected a light, or a list of them under lights");
+        throw Error::at(ErrorCode::invalid_input, "light", "is missing", "expected a light, or a list of them under lights");
     if (!list) {
         scene.light = parse_light(root.need("light"), resources);
         return;
@@ -60,8 +60,8 @@ void check_shared_views(const JsonObject& root)
     if (!lights || lights->elements().size() < 2) return;
     const auto receivers = root.find("receivers");
     if (!receivers || follows_light(JsonObject(*receivers), true))
-        throw Error(ErrorCode::invalid_input, std::string("receivers.camera: ") + not_shared,
-                    "expected kind \"pinhole\": all masks have one viewpoint");
+        throw Error::at(ErrorCode::invalid_input, "receivers.camera", not_shared,
+                        "expected kind \"pinhole\": all masks have one viewpoint");
     const auto objects = root.find("objects");
     if (!objects) return;
     for (const JsonValue& object : objects->elements())

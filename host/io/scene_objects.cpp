@@ -2,6 +2,7 @@
 #include <numbers>
 
 #include "io/mesh_io.hpp"
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "scene/camera.hpp"
 
@@ -12,7 +13,7 @@ namespace {
 // Counter-clockwise seen from the side that cross(half_u, half_v) points to.
 TriangleMesh read_quad(const JsonValue& value)
 {
-    const JsonObject section(value, {"center", "half_u", "half_v"});
+    const JsonObject section = checked(value, scene_file::quad());
     const Vec3 center = section.need("center").vec3(), u = section.need("half_u").vec3(), v = section.need("half_v").vec3();
     // Positions become float32: half-edges closer to parallel than its 24 bits can tell have no area for certain.
     if (!(u.normalized().cross(v.normalized()).length() > 0x1p-20))
@@ -24,16 +25,26 @@ TriangleMesh read_quad(const JsonValue& value)
     return mesh;
 }
 
+// The error of a reader that is not ours, which tells files by the paths that it was given, with the names that the scene has for them.
+Error with_names(const Error& error, const std::string& path, const std::string& name)
+{
+    std::string message = error.message();
+    const std::string folder = path.ends_with(name) ? path.substr(0, path.size() - name.size()) : std::string();
+    for (std::size_t at = 0; folder.size() > 1 && (at = message.find(folder, at)) != std::string::npos;) message.erase(at, folder.size());
+    return {error.code(), std::move(message), error.hint()};
+}
+
 TriangleMesh read_mesh_file(const JsonValue& name, const Resources& resources)
 {
     const std::string file = name.text();
-    std::string path;
-    try {
-        path = resources.path(file);
-    } catch (const Error& error) {
-        throw error.within(name.key());
-    }
-    return read_mesh(path, name.key() + ": " + file);
+    return under(name, [&] {
+        const std::string path = resources.path(file);
+        try {
+            return read_mesh(path, file);
+        } catch (const Error& error) {
+            throw with_names(error, path, file);
+        }
+    });
 }
 
 TriangleMesh read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
@@ -54,7 +65,7 @@ TriangleMesh read_depth_surface(const JsonObject& section, const Light& light, c
 void place(TriangleMesh& mesh, const JsonObject& section)
 {
     const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
-    const double s = scale ? scale->positive() : 1;
+    const double s = scale ? scale->number() : 1;
     const Vec3 r = rotate ? rotate->vec3() * (std::numbers::pi / 180) : Vec3(0, 0, 0);
     const Vec3 t = translate ? translate->vec3() : Vec3(0, 0, 0);
     const Vec3 c(std::cos(r.x), std::cos(r.y), std::cos(r.z)), n(std::sin(r.x), std::sin(r.y), std::sin(r.z));
@@ -71,21 +82,22 @@ void place(TriangleMesh& mesh, const JsonObject& section)
 
 } // namespace
 
-Object parse_object(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)
+penumbra::Object parse_object(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings)
 {
-    const JsonObject section(value);
-    const int kinds = section.has("mesh") + section.has("quad") + section.has("depth");
+    using namespace scene_file;
+    const JsonObject given(value);
+    const int kinds = given.has("mesh") + given.has("quad") + given.has("depth");
     if (kinds != 1) throw value.error("has " + std::to_string(kinds) + " of mesh, quad and depth, expected exactly one");
+    const ObjectForm form = given.has("mesh") ? mesh_form : given.has("quad") ? quad_form : depth_form;
+    const JsonObject section = checked(value, scene_file::object().forms[form]);
 
-    Object object;
+    penumbra::Object object;
     if (const auto casts = section.find("casts")) object.casts = casts->flag();
     if (const auto receives = section.find("receives")) object.receives = receives->flag();
     if (section.has("depth")) {
-        section.allow_only({"depth", "camera", "encoding", "scale", "rotate_deg", "translate", "casts", "receives"}, "of a depth object");
         object.name = section.need("depth").text();
         object.mesh = read_depth_surface(section, light, resources, warnings);
     } else {
-        section.allow_only({"mesh", "quad", "scale", "rotate_deg", "translate", "casts", "receives"}, "of an object");
         object.name = section.has("mesh") ? section.need("mesh").text() : "quad";
         object.mesh = section.has("mesh") ? read_mesh_file(section.need("mesh"), resources) : read_quad(section.need("quad"));
     }

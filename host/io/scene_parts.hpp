@@ -11,6 +11,16 @@
 
 namespace penumbra {
 
+// What `read` gives; its errors are found under the key of `value`.
+template <class Read> auto under(const JsonValue& value, const Read& read)
+{
+    try {
+        return read();
+    } catch (const Error& error) {
+        throw error.under(value.key());
+    }
+}
+
 // Lights (scene_light.cpp); emission images come through `resources`. What is wrong with a light is told under the key of `value`. A member
 // of `lights` may have the keys of SceneLight as well, which are left to others.
 Light parse_light(const JsonValue& value, const Resources& resources, bool listed = false);

@@ -53,8 +53,8 @@ Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vect
 {
     const LightBox fit = light_box(light, objects);
     if (!spec.half_extent && fit.box.isEmpty())
-        throw Error(ErrorCode::invalid_input, std::string(where) + ".half_extent: is missing and there are no objects to fit it to",
-                    "expected two positive lengths");
+        throw Error::at(ErrorCode::invalid_input, std::string(where) + ".half_extent", "is missing and there are no objects to fit it to",
+                        "expected two positive lengths");
 
     Vec3 center = spec.center.value_or(Vec3(0, 0, 0));
     if (!spec.center && !fit.box.isEmpty()) {
@@ -81,12 +81,12 @@ Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::ve
     const std::string key = std::string(where) + ".tan_half_fov";
     const LightBox fit = light_box(light, objects);
     if (fit.tangent.x == 0 && fit.tangent.y == 0)
-        throw Error(ErrorCode::invalid_input, key + ": is missing and there is nothing before the light to fit it to",
-                    "expected two positive tangents");
+        throw Error::at(ErrorCode::invalid_input, key, "is missing and there is nothing before the light to fit it to",
+                        "expected two positive tangents");
     if (!fit.crosses.empty())
-        throw Error(ErrorCode::invalid_input,
-                    key + ": is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
-                    "expected two positive tangents");
+        throw Error::at(ErrorCode::invalid_input, key,
+                        "is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
+                        "expected two positive tangents");
     return light_camera(light, with_margin(fit.tangent, width, height), light.origin);
 }
 
@@ -127,15 +127,14 @@ void validate(const Camera& camera, std::string_view where)
     const double angles = std::max({std::abs(f.x.dot(f.y)), std::abs(f.y.dot(f.z)), std::abs(f.z.dot(f.x))});
     const double handed = (f.x.cross(f.y) - f.z).length();
     if (!(lengths < tolerance && angles < tolerance && handed < 4 * tolerance))
-        throw Error(ErrorCode::invalid_input, std::string(where) + ".world_from_camera: is not a rigid right-handed frame",
-                    "expected orthogonal axes of length 1, no scale, no mirroring");
+        throw Error::at(ErrorCode::invalid_input, std::string(where) + ".world_from_camera", "is not a rigid right-handed frame",
+                        "expected orthogonal axes of length 1, no scale, no mirroring");
     if (!std::isfinite(f.origin.x) || !std::isfinite(f.origin.y) || !std::isfinite(f.origin.z))
-        throw Error(ErrorCode::invalid_input, std::string(where) + ": the camera's position is not finite", "expected finite numbers");
+        throw Error::at(ErrorCode::invalid_input, std::string(where), "the camera's position is not finite", "expected finite numbers");
     for (const double half : {camera.half_extent.x, camera.half_extent.y})
         if (!(half > 0) || !std::isfinite(half))
-            throw Error(ErrorCode::invalid_input,
-                        std::string(where) + (camera.orthographic ? ".half_extent: " : ".tan_half_fov: ") + "is " + std::to_string(half),
-                        "expected positive finite numbers: a camera needs a field of view");
+            throw Error::at(ErrorCode::invalid_input, std::string(where) + (camera.orthographic ? ".half_extent" : ".tan_half_fov"),
+                            "is " + std::to_string(half), "expected positive finite numbers: a camera needs a field of view");
 }
 
 Vec3 camera_point(const Camera& camera, int width, int height, double x_px, double y_px, double depth)

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <initializer_list>
+#include <utility>
 
 namespace penumbra {
 namespace {
@@ -23,14 +25,43 @@ constexpr std::array rows{
 
 const Row& row(ErrorCode code) { return rows.at(static_cast<std::size_t>(code)); }
 
+// The parts that are there, in order.
+std::string joined(std::initializer_list<std::string_view> parts)
+{
+    std::string line;
+    for (const std::string_view part : parts)
+        if (!part.empty()) line += (line.empty() ? "" : ": ") + std::string(part);
+    return line;
+}
+
 } // namespace
 
-Error::Error(ErrorCode code, std::string message, std::string hint)
-    : code_(code), message_(std::move(message)), hint_(std::move(hint)), what_(hint_.empty() ? message_ : message_ + " (" + hint_ + ")")
+Error::Error(ErrorCode code, std::string place, std::string path, std::string message, std::string hint)
+    : code_(code), place_(std::move(place)), path_(std::move(path)), message_(std::move(message)), hint_(std::move(hint)),
+      what_(joined({place_, path_, message_}) + (hint_.empty() ? "" : " (" + hint_ + ")"))
 {
 }
 
-Error Error::within(std::string_view where) const { return Error(code_, std::string(where) + ": " + message_, hint_); }
+Error::Error(ErrorCode code, std::string message, std::string hint) : Error(code, {}, {}, std::move(message), std::move(hint)) {}
+
+Error Error::at(ErrorCode code, std::string path, std::string message, std::string hint)
+{
+    return {code, {}, std::move(path), std::move(message), std::move(hint)};
+}
+
+Error Error::within(std::string_view where) const
+{
+    const bool there = place_.starts_with(where) && (place_.size() == where.size() || place_.substr(where.size()).starts_with(": "));
+    return {code_, there ? place_ : joined({where, place_}), path_, message_, hint_};
+}
+
+Error Error::under(std::string_view key) const
+{
+    const bool dotted = !key.empty() && !path_.empty() && !path_.starts_with('[');
+    return {code_, {}, std::string(key) + (dotted ? "." : "") + path_, joined({place_, message_}), hint_};
+}
+
+Error Error::with_path(std::string path) const { return {code_, place_, std::move(path), message_, hint_}; }
 
 std::string_view name(ErrorCode code) { return row(code).name; }
 

@@ -12,7 +12,10 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-[[noreturn]] void reject(const std::string& what, const std::string& expected) { throw Error(ErrorCode::invalid_input, what, expected); }
+[[noreturn]] void reject(std::string path, std::string what, std::string expected)
+{
+    throw Error::at(ErrorCode::invalid_input, std::move(path), std::move(what), std::move(expected));
+}
 
 bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
@@ -59,74 +62,75 @@ LightFrame frame_of(const RectangleLight& light)
     return frame;
 }
 
-void validate_axes(const Vec3& direction, const std::optional<Vec3>& up)
+void validate_axes(const Vec3& direction, const std::optional<Vec3>& up, const std::string& at)
 {
     if (!finite(direction) || direction.length() == 0)
-        reject("light.direction: has no length", "expected a finite vector that is not zero");
+        reject(at + ".direction", "has no length", "expected a finite vector that is not zero");
     if (!up) return;
-    if (!finite(*up) || up->length() == 0) reject("light.up: has no length", "expected a finite vector that is not zero");
+    if (!finite(*up) || up->length() == 0) reject(at + ".up", "has no length", "expected a finite vector that is not zero");
     // Below this sine the side axis would be rounding noise: both inputs carry up to 2^-53 relative error.
     if (direction.normalized().cross(up->normalized()).length() < 1e-6)
-        reject("light.up: is parallel to light.direction", "expected a vector that points away from it");
+        reject(at + ".up", "is parallel to " + at + ".direction", "expected a vector that points away from it");
 }
 
 void validate_emission(const Image& image, const std::string& key)
 {
     if (image.channels != 1 && image.channels != 3)
-        reject(key + ": has " + std::to_string(image.channels) + " channels", "expected 1 or 3, no alpha");
+        reject(key, "has " + std::to_string(image.channels) + " channels", "expected 1 or 3, no alpha");
     bool light_somewhere = false;
     for (const float e : image.pixels) {
-        if (!std::isfinite(e) || e < 0) reject(key + ": has a pixel of " + std::to_string(e), "expected finite values, 0 or more");
+        if (!std::isfinite(e) || e < 0) reject(key, "has a pixel of " + std::to_string(e), "expected finite values, 0 or more");
         light_somewhere |= e > 0;
     }
-    if (!light_somewhere) reject(key + ": is black", "expected at least one pixel above 0");
+    if (!light_somewhere) reject(key, "is black", "expected at least one pixel above 0");
 }
 
-void validate(const RectangleLight& light)
+void validate(const RectangleLight& light, const std::string& at)
 {
-    if (!finite(light.center)) reject("light.center: is not finite", "expected three finite numbers");
-    if (!finite(light.half_u)) reject("light.half_u: is not finite", "expected three finite numbers");
-    if (!finite(light.half_v)) reject("light.half_v: is not finite", "expected three finite numbers");
+    if (!finite(light.center)) reject(at + ".center", "is not finite", "expected three finite numbers");
+    if (!finite(light.half_u)) reject(at + ".half_u", "is not finite", "expected three finite numbers");
+    if (!finite(light.half_v)) reject(at + ".half_v", "is not finite", "expected three finite numbers");
     const double lengths = light.half_u.length() * light.half_v.length();
     const double cosine = lengths > 0 ? std::abs(light.half_u.dot(light.half_v)) / lengths : 0;
     if (cosine > 1e-5)
-        reject("light.half_v: is not orthogonal to light.half_u (the cosine between them is " + std::to_string(cosine) + ")",
+        reject(at + ".half_v", "is not orthogonal to " + at + ".half_u (the cosine between them is " + std::to_string(cosine) + ")",
                "expected half-edges at a right angle, cosine at most 0.00001");
-    if (light.emission && !light.frames.empty()) reject("light.emission: is an image and a sequence", "expected one of the two");
+    if (light.emission && !light.frames.empty()) reject(at + ".emission", "is an image and a sequence", "expected one of the two");
     if (!light.emission && light.frames.empty()) return;
     if (light.half_u.length() == 0 || light.half_v.length() == 0)
-        reject("light.emission: the rectangle has no area", "expected half_u and half_v that are not zero, or no emission");
-    if (light.emission) validate_emission(*light.emission, "light.emission");
+        reject(at + ".emission", "the rectangle has no area", "expected half_u and half_v that are not zero, or no emission");
+    if (light.emission) validate_emission(*light.emission, at + ".emission");
     if (light.frames.size() > max_frames)
-        reject("light.emission: has " + std::to_string(light.frames.size()) + " frames", "expected at most " + std::to_string(max_frames));
+        reject(at + ".emission", "has " + std::to_string(light.frames.size()) + " frames",
+               "expected at most " + std::to_string(max_frames));
     for (std::size_t i = 0; i < light.frames.size(); ++i) {
-        const std::string key = "light.emission[" + std::to_string(i) + "]";
+        const std::string key = at + ".emission[" + std::to_string(i) + "]";
         validate_emission(light.frames[i], key);
         if (light.frames[i].channels != light.frames[0].channels)
-            reject(key + ": has " + std::to_string(light.frames[i].channels) + " channels",
+            reject(key, "has " + std::to_string(light.frames[i].channels) + " channels",
                    "expected " + std::to_string(light.frames[0].channels) + ", as the first frame has");
     }
 }
 
-void validate(const SphereLight& light)
+void validate(const SphereLight& light, const std::string& at)
 {
-    if (!finite(light.center)) reject("light.center: is not finite", "expected three finite numbers");
+    if (!finite(light.center)) reject(at + ".center", "is not finite", "expected three finite numbers");
     if (!std::isfinite(light.radius) || light.radius < 0)
-        reject("light.radius: is " + std::to_string(light.radius), "expected 0 or more, finite");
-    validate_axes(light.direction, light.up);
+        reject(at + ".radius", "is " + std::to_string(light.radius), "expected 0 or more, finite");
+    validate_axes(light.direction, light.up, at);
 }
 
-void validate(const PointLight& light)
+void validate(const PointLight& light, const std::string& at)
 {
-    if (!finite(light.center)) reject("light.center: is not finite", "expected three finite numbers");
-    validate_axes(light.direction, light.up);
+    if (!finite(light.center)) reject(at + ".center", "is not finite", "expected three finite numbers");
+    validate_axes(light.direction, light.up, at);
 }
 
-void validate(const DirectionalLight& light)
+void validate(const DirectionalLight& light, const std::string& at)
 {
-    validate_axes(light.direction, light.up);
+    validate_axes(light.direction, light.up, at);
     if (!std::isfinite(light.angular_diameter_deg) || light.angular_diameter_deg < 0 || light.angular_diameter_deg >= 180)
-        reject("light.angular_diameter_deg: is " + std::to_string(light.angular_diameter_deg), "expected 0 or more and below 180");
+        reject(at + ".angular_diameter_deg", "is " + std::to_string(light.angular_diameter_deg), "expected 0 or more and below 180");
 }
 
 } // namespace
@@ -160,9 +164,9 @@ std::string kind_of(const Light& light)
     return kinds[light.index()];
 }
 
-void validate(const Light& light)
+void validate(const Light& light, std::string_view where)
 {
-    std::visit([](const auto& l) { validate(l); }, light);
+    std::visit([where](const auto& l) { validate(l, std::string(where)); }, light);
 }
 
 Vec3 light_from_world(const LightFrame& light, const Vec3& point)

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include <penumbra/scene.hpp>
 
@@ -24,10 +25,10 @@ LightFrame light_frame(const Light& light);
 
 std::string kind_of(const Light& light); // "rectangle", "sphere", "point", "directional"
 
-// Throws invalid_input, the message starting with the key ("light.half_u: ..."): extents that are not finite, half-edges not orthogonal
+// Throws invalid_input with the path of the key, that of the light being `where`: extents that are not finite, half-edges not orthogonal
 // (their cosine beyond 1e-5), negative radius, no direction, up along direction, angular diameter outside [0, 180), emission of the wrong
 // kind.
-void validate(const Light& light);
+void validate(const Light& light, std::string_view where = "light");
 
 Vec3 light_from_world(const LightFrame& light, const Vec3& point);
 

@@ -25,8 +25,8 @@ void validate_occluders(const Scene& scene);
 // several lights share is not seen from one of them. A scene with one light passes when that light does.
 void validate_lights(const Scene& scene);
 
-// The error of a light by itself, in the words of a list: "light.center" becomes "lights[2].center", "occluders" (of its own)
-// "lights[2].occluders"; what names neither, nor receivers or objects, gets "lights[2]" in front.
+// The error of a light by itself, in the words of a list: the path "light.center" becomes "lights[2].center", "occluders" (of its own)
+// "lights[2].occluders"; what is about neither, nor about receivers or objects, has its place in "lights[2]".
 Error in_list(const Error& error, std::size_t index, bool own_occluders);
 
 } // namespace penumbra

@@ -6,9 +6,10 @@
 
 #include "http/describe.hpp"
 #include "http/route.hpp"
+#include "io/scene_schema.hpp"
 #include "masks/mask_format.hpp"
+#include "masks/scene_patch.hpp"
 #include "process/problem.hpp"
-#include "scene/lights.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -32,11 +33,11 @@ void add_problems(Json& responses, const std::vector<int>& statuses)
 Json header(const char* meaning) { return {{"description", meaning}, {"schema", text_schema}}; }
 
 // The form of a scene with its images, or of a patch with further ones.
-Json form(const char* scene, const Options& options, bool scene_needed)
+Json form(const Json& scene, const Options& options, bool scene_needed)
 {
     Json schema = {{"type", "object"},
                    {"description", "Every image that part `scene` names is a part of that name, an EXR, PNG, TIFF or PFM."},
-                   {"properties", {{"scene", {{"type", "object"}, {"description", scene}}}}},
+                   {"properties", {{"scene", scene}}},
                    {"additionalProperties", binary_schema},
                    {"maxProperties", options.parts}};
     if (scene_needed) schema["required"] = {"scene"};
@@ -46,11 +47,10 @@ Json form(const char* scene, const Options& options, bool scene_needed)
 Json body_of(const Route& route, const Options& options)
 {
     if (!route.path.ends_with("{id}/masks"))
-        return {{"required", true}, {"content", content("multipart/form-data", form("a scene file, version 1", options, true))}};
-    const char* const patch = "a JSON Merge Patch (RFC 7396) of light, lights, receivers, technique and output";
-    Json types = content("application/json", {{"type", "object"}, {"description", patch}});
-    types.update(content("application/merge-patch+json", {{"type", "object"}, {"description", patch}}));
-    types.update(content("multipart/form-data", form(patch, options, false)));
+        return {{"required", true}, {"content", content("multipart/form-data", form(reference("Scene"), options, true))}};
+    Json types = content("application/json", reference("ScenePatch"));
+    types.update(content("application/merge-patch+json", reference("ScenePatch")));
+    types.update(content("multipart/form-data", form(reference("ScenePatch"), options, false)));
     return {{"required", false}, {"content", types}};
 }
 
@@ -129,25 +129,41 @@ Json operation_of(const Route& route, const Options& options)
     return operation;
 }
 
+// What is in a section is judged when it has been merged.
+Json patch_schema()
+{
+    Json schema = {{"type", "object"},
+                   {"description", "a JSON Merge Patch (RFC 7396) of a scene: members replace those of the same name, null takes one away"},
+                   {"properties", Json::object()},
+                   {"additionalProperties", false}};
+    for (const std::string_view section : patched_sections)
+        schema["properties"][std::string(section)] = {{"type", {section == "lights" ? "array" : "object", "null"}}};
+    return schema;
+}
+
 Json schemas()
 {
+    Json all = scene_definitions("#/components/schemas/");
     const Json whole = {{"type", "integer"}};
     const Json texts = {{"type", "array"}, {"items", text_schema}};
-    return {{"Problem",
-             {{"type", "object"},
-              {"properties",
-               {{"type", text_schema},
-                {"title", text_schema},
-                {"status", whole},
-                {"detail", text_schema},
-                {"reason", text_schema},
-                {"retry_after", whole},
-                {"request_id", text_schema}}},
-              {"required", {"type", "title", "status", "detail", "reason"}}}},
-            {"KeptScene",
-             {{"type", "object"},
-              {"properties", {{"id", text_schema}, {"expires_s", whole}, {"bytes", whole}, {"warnings", texts}}},
-              {"required", {"id", "expires_s", "bytes", "warnings"}}}}};
+    all.update({{"Problem",
+                 {{"type", "object"},
+                  {"properties",
+                   {{"type", text_schema},
+                    {"title", text_schema},
+                    {"status", whole},
+                    {"detail", text_schema},
+                    {"path", text_schema},
+                    {"reason", text_schema},
+                    {"retry_after", whole},
+                    {"request_id", text_schema}}},
+                  {"required", {"type", "title", "status", "detail", "reason"}}}},
+                {"KeptScene",
+                 {{"type", "object"},
+                  {"properties", {{"id", text_schema}, {"expires_s", whole}, {"bytes", whole}, {"warnings", texts}}},
+                  {"required", {"id", "expires_s", "bytes", "warnings"}}}},
+                {"ScenePatch", patch_schema()}});
+    return all;
 }
 
 } // namespace

@@ -7,6 +7,7 @@
 #include <penumbra/error.hpp>
 
 #include "io/json_value.hpp"
+#include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "masks/digest.hpp"
 #include "masks/resources.hpp"
@@ -70,7 +71,7 @@ struct KeptScene::Changes {
     {
         const auto a = before.find(section), b = after.find(section);
         if ((a == before.end()) != (b == after.end())) return false;
-        return a == before.end() || (*a == *b && !mentions(*b, names));
+        return a == before.end() || (*a == *b && !names_file(*b, section, names));
     }
     bool same_lights() const { return same("light") && same("lights"); }
     std::string text(const char* section) const { return after.contains(section) ? after[section].dump() : std::string(); }
@@ -115,12 +116,12 @@ void KeptScene::check_objects(const Changes& changes) const
     if (scene_.job.geometry.objects().empty()) return;
     const auto objects = changes.after.find("objects");
     if (objects == changes.after.end()) return;
-    if (mentions(*objects, changes.names))
-        throw Error(ErrorCode::invalid_input, "objects: name a part that came with this request, and objects are kept as they are",
-                    "give the part another name, or upload the scene anew");
+    if (names_file(*objects, "objects", changes.names))
+        throw Error::at(ErrorCode::invalid_input, "objects", "name a part that came with this request, and objects are kept as they are",
+                        "give the part another name, or upload the scene anew");
     if (!changes.same_lights() && objects_follow_light(changes.after))
-        throw Error(ErrorCode::invalid_input, "light: cannot be changed: the depth of an object is seen from the light itself",
-                    "give that object a camera of kind pinhole, or upload the scene anew");
+        throw Error::at(ErrorCode::invalid_input, "light", "cannot be changed: the depth of an object is seen from the light itself",
+                        "give that object a camera of kind pinhole, or upload the scene anew");
 }
 
 std::vector<MaskLight> KeptScene::patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
@@ -148,7 +149,7 @@ void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lig
         const MaskLight& light = lights[i];
         const nlohmann::json& json = light.place ? changes.after["lights"][*light.place] : changes.after["light"];
         MaskTask::LightKeys keys;
-        if (same_occluders && !mentions(json, changes.names)) keys.frame = json.dump() + '\n' + changes.text("technique");
+        if (same_occluders && !names_file(json, light.place ? "lights[]" : "light", changes.names)) keys.frame = json.dump() + '\n' + changes.text("technique");
         if (frames_of(light.light) > 0 && !keys.frame.empty()) {
             keys.still = keys.frame;
             keys.frame += "\nframe " + std::to_string(choice.frame);
@@ -181,29 +182,27 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
                   .cache = &cache_,
                   .light_keys = {},
                   .receivers_key = changes.text("receivers")};
-    resources.without_paths([&] {
-        const JsonObject root(JsonValue(after, {}));
-        if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
-        if (!changes.same("technique"))
-            task.job.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
+    const JsonObject root(JsonValue(after, {}));
+    if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
+    if (!changes.same("technique"))
+        task.job.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
 
-        const bool same_lights = changes.same_lights() && changes.same("occluders");
-        std::vector<MaskLight> patched;
-        if (!same_lights) patched = patched_lights(changes, root, resources, task.job.warnings);
-        const std::vector<MaskLight>& lights = same_lights ? scene_.job.lights : patched;
-        const Light& first = lights.front().light;
-        const bool same_cameras = is_directional(first) == is_directional(scene_.job.lights.front().light);
-        check_shared_views(root);
-        if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
-            task.job.receivers = std::make_shared<const Receivers>(
-                root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.job.warnings) : Receivers{});
+    const bool same_lights = changes.same_lights() && changes.same("occluders");
+    std::vector<MaskLight> patched;
+    if (!same_lights) patched = patched_lights(changes, root, resources, task.job.warnings);
+    const std::vector<MaskLight>& lights = same_lights ? scene_.job.lights : patched;
+    const Light& first = lights.front().light;
+    const bool same_cameras = is_directional(first) == is_directional(scene_.job.lights.front().light);
+    check_shared_views(root);
+    if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
+        task.job.receivers = std::make_shared<const Receivers>(
+            root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.job.warnings) : Receivers{});
 
-        choose(changes, lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice, task);
-        if (!changes.same("receivers") && mentions(after.value("receivers", nlohmann::json()), changes.names)) task.receivers_key.clear();
-        // Seen from the light, or fitted by it, the receivers depend on it.
-        if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.job.receivers->camera))
-            task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
-    });
+    choose(changes, lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice, task);
+    if (!changes.same("receivers") && names_file(after.value("receivers", nlohmann::json()), "receivers", changes.names)) task.receivers_key.clear();
+    // Seen from the light, or fitted by it, the receivers depend on it.
+    if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.job.receivers->camera))
+        task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
     return task;
 }
 

@@ -37,14 +37,6 @@ std::string_view RequestResources::use(const std::string& name) const
     return part->bytes;
 }
 
-Error RequestResources::without_paths(const Error& error) const
-{
-    std::string message = error.message();
-    const std::string folder = folder_.empty() ? "" : folder_.string() + "/";
-    for (std::size_t at = 0; !folder.empty() && (at = message.find(folder, at)) != std::string::npos;) message.erase(at, folder.size());
-    return {error.code(), message, error.hint()};
-}
-
 Bytes RequestResources::bytes(const std::string& name) const
 {
     const std::string_view text = use(name);

@@ -30,19 +30,11 @@ public:
     std::string path(const std::string& name) const override;
     std::uint64_t max_samples() const override { return static_cast<std::uint64_t>(options_.image_samples); }
 
-    // What `call` gives; what it throws names no file: a mesh reader's complaint may name the temporary one that we gave it.
-    template <class Call> auto without_paths(Call&& call) const
-    {
-        try {
-            return call();
-        } catch (const Error& error) {
-            throw without_paths(error);
-        }
-    }
+    // The scene file's reader tells files by their names in the scene: there are no paths to take out.
+    template <class Call> auto without_paths(Call&& call) const { return call(); }
 
 private:
     std::string_view use(const std::string& name) const;
-    Error without_paths(const Error& error) const;
 
     std::span<const Part> parts_;
     const Options& options_;

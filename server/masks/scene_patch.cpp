@@ -1,7 +1,6 @@
 #include "masks/scene_patch.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include <penumbra/error.hpp>
 
@@ -11,8 +10,6 @@ namespace penumbra::server {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::array<std::string_view, 5> sections{"light", "lights", "receivers", "technique", "output"};
 
 // RFC 7396, but for objects of another kind.
 void merge(Json& target, const Json& patch)
@@ -36,19 +33,13 @@ void merge(Json& target, const Json& patch)
 Json patched(const Json& scene, const Json& patch)
 {
     if (!patch.is_object()) throw Error(ErrorCode::invalid_input, "the patch is no JSON object", "expected {\"light\": {...}} or the like");
-    for (const auto& [key, value] : patch.items())
-        if (std::ranges::find(sections, key) == sections.end())
-            throw Error(ErrorCode::invalid_input, in_quotes(key) + ": cannot be changed in a kept scene",
-                        "expected light, lights, receivers, technique or output; for anything else upload the scene anew");
+    for (const auto& [key, value] : JsonObject(JsonValue(patch, {})).members())
+        if (std::ranges::find(patched_sections, key) == patched_sections.end())
+            throw value.error("cannot be changed in a kept scene",
+                              "expected light, lights, receivers, technique or output; for anything else upload the scene anew");
     Json result = scene;
     merge(result, patch);
     return result;
-}
-
-bool mentions(const Json& json, std::span<const std::string_view> names)
-{
-    if (json.is_string()) return std::ranges::find(names, std::string_view(json.get_ref<const std::string&>())) != names.end();
-    return json.is_structured() && std::ranges::any_of(json, [&](const Json& member) { return mentions(member, names); });
 }
 
 bool objects_follow_light(const Json& scene)

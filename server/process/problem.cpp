@@ -19,8 +19,11 @@ Problem problem_from(const Error& error)
     case ErrorCode::output:
     case ErrorCode::internal:
         return Problem(status, reason, "the request failed inside the service; its log has the reason under the request's id");
-    default:
-        return Problem(status, reason, error.what());
+    default: {
+        Problem problem(status, reason, error.what());
+        problem.path = error.path();
+        return problem;
+    }
     }
 }
 
@@ -71,6 +74,7 @@ std::string json_of(const Problem& problem, std::string_view request_id)
                                    {"status", problem.status},
                                    {"detail", problem.detail},
                                    {"reason", problem.reason}};
+    if (!problem.path.empty()) json["path"] = problem.path;
     if (problem.retry_after_s > 0) json["retry_after"] = problem.retry_after_s;
     if (!request_id.empty()) json["request_id"] = request_id;
     return json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";

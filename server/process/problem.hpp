@@ -16,6 +16,7 @@ struct Problem : std::exception {
 
     int status;
     std::string reason, detail;
+    std::string path;  // of the value in the scene that it is about; empty: of none
     int retry_after_s; // 0: trying again does not help
     const char* what() const noexcept override { return detail.c_str(); }
 };

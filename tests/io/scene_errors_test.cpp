@@ -172,7 +172,7 @@ TEST(SceneErrors, Encodings)
         {with(R"({"kind": "linear"})"), "receivers.encoding.kind: is \"linear\"",
          "planar, radial, disparity, window, reversed_window, normalized"},
         {with(R"({"kind": "planar", "near": 1})"), "receivers.encoding.near", "of planar depth"},
-        {with(R"({"kind": "window"})"), "receivers.depth: depth.exr", "near"},
+        {with(R"({"kind": "window"})"), "receivers.encoding.near: is missing"},
         {with(R"({"kind": "normalized", "near": 2, "far": 1})"), "receivers.depth: depth.exr", "near"},
         {with(R"({"kind": "planar", "scale": 0})"), "receivers.encoding.scale"},
         {with(R"({"kind": "planar", "scale": "m"})"), "receivers.encoding.scale"},

@@ -181,7 +181,10 @@ TEST(SceneFile, LoadsBesideItsImages)
     const std::string lost = folder.write("lost.json", scene_of(rectangle + R"(, "receivers": {"depth": "lost.exr"})"));
     const Error error = error_of([&] { load_scene(lost); });
     EXPECT_EQ(error.code(), ErrorCode::not_found);
-    EXPECT_EQ(error.message().rfind(lost + ": receivers.depth: lost.exr", 0), 0u) << error.what();
+    EXPECT_EQ(error.place(), lost);
+    EXPECT_EQ(error.path(), "receivers.depth");
+    EXPECT_EQ(error.message(), "lost.exr: no such file");
+    EXPECT_EQ(std::string(error.what()).rfind(lost + ": receivers.depth: lost.exr", 0), 0u) << error.what();
 }
 
 namespace {

@@ -113,9 +113,9 @@ TEST(Camera, NothingToFitTo)
     for (const auto& objects : {std::vector<Object>{}, {quad({0, 0, 5}, {1, 0, 0}, {0, 1, 0})}}) {
         const Error e = error(rectangle_light(1, 1), objects);
         EXPECT_EQ(e.code(), ErrorCode::invalid_input);
-        EXPECT_TRUE(e.message().starts_with("occluders.camera.tan_half_fov")) << e.what();
+        EXPECT_TRUE(e.path() == "occluders.camera.tan_half_fov") << e.what();
     }
-    EXPECT_TRUE(error(DirectionalLight{}, {}).message().starts_with("occluders.camera.half_extent"));
+    EXPECT_TRUE(error(DirectionalLight{}, {}).path() == "occluders.camera.half_extent");
     // A triangle through the light's plane spans any field of view.
     const Error through = error(rectangle_light(1, 1), {quad({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, "wall")});
     EXPECT_TRUE(holds(through.message(), "wall")) << through.what();
@@ -126,7 +126,7 @@ TEST(Camera, BadFramesAndViewsAreRefused)
     const auto refused = [](const Frame& frame, const Vec2& half) {
         const Error error = error_of([&] { validate({.frame = frame, .orthographic = false, .half_extent = half}, "receivers.camera"); });
         EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-        EXPECT_TRUE(error.message().starts_with("receivers.camera")) << error.what();
+        EXPECT_TRUE(error.path().starts_with("receivers.camera")) << error.what();
     };
     const Frame good;
     Frame scaled = good, skewed = good, mirrored = good, lost = good, nan = good;

@@ -115,7 +115,7 @@ TEST(ValidateLight, SaysWhichKeyIsWrong)
     const auto refused = [](const Light& light, const std::string& key) {
         const Error error = error_of([&] { validate(light); });
         EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-        EXPECT_TRUE(error.message().starts_with("light." + key)) << error.what();
+        EXPECT_TRUE(error.path() == "light." + std::string(key)) << error.what();
         EXPECT_FALSE(error.hint().empty());
     };
     refused(RectangleLight{.center = {nan, 0, 0}, .half_u = {1, 0, 0}, .half_v = {0, 1, 0}, .emission = {}}, "center");

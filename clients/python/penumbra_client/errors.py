@@ -14,14 +14,17 @@ class PenumbraError(Exception):
     status      HTTP status; None when there was no answer
     detail      what went wrong, where, and what was expected
     reason      one word, the service's or the client's own ("connect", "timeout", "broken_answer")
+    path        of the value in the scene that it is about ("light.half_u"); "" when it is about none
     request_id  the request's name in the service's log; "" when there was no answer
     """
 
-    def __init__(self, detail: str, *, status: Optional[int] = None, reason: str = "", request_id: str = "") -> None:
+    def __init__(self, detail: str, *, status: Optional[int] = None, reason: str = "", path: str = "",
+                 request_id: str = "") -> None:
         super().__init__(detail if status is None else f"{status}: {detail}")
         self.detail = detail
         self.status = status
         self.reason = reason
+        self.path = path
         self.request_id = request_id
 
 

@@ -7,6 +7,8 @@ import os
 import re
 from typing import Any, Callable, Dict, Iterable, List, Tuple
 
+from .file_places import FILE_PLACES
+
 Scene = Dict[str, Any]
 Rename = Callable[[str], str]
 
@@ -54,31 +56,17 @@ def rename_files(scene: Scene, rename: Rename) -> None:
 
 
 def _places(scene: Scene) -> Iterable[Tuple[Any, Any]]:
-    lights = [_section(scene, "light")] + _objects(scene, "lights")
-    candidates: List[Tuple[Any, Any]] = []
-    for light in lights:
-        candidates += [(light, "emission")] + _elements(light, "emission")
-    for holder in lights + [scene]:
-        depth = _section(_section(holder, "occluders"), "depth")
-        candidates += [(depth, "front"), (depth, "back")] + _elements(depth, "layers")
-    candidates.append((_section(scene, "receivers"), "depth"))
-    for item in _objects(scene, "objects"):
-        candidates += [(item, "mesh"), (item, "depth")]
-    return [(holder, key) for holder, key in candidates if isinstance(holder, list) or key in holder]
-
-
-def _elements(holder: Scene, key: str) -> List[Tuple[Any, Any]]:
-    found = holder.get(key)
-    return [(found, i) for i in range(len(found))] if isinstance(found, list) else []
-
-
-def _objects(scene: Scene, key: str) -> List[Scene]:
-    return [scene[key][i] for _, i in _elements(scene, key) if isinstance(scene[key][i], dict)]
-
-
-def _section(scene: Scene, key: str) -> Scene:
-    section = scene.get(key)
-    return section if isinstance(section, dict) else {}
+    found: List[Tuple[Any, Any]] = []
+    for place in FILE_PLACES:
+        holders: List[Tuple[Any, Any]] = [({"": scene}, "")]
+        for step in re.findall(r"\w+|\[\]", place):
+            values = [holder[key] for holder, key in holders]
+            if step == "[]":
+                holders = [(value, i) for value in values if isinstance(value, list) for i in range(len(value))]
+            else:
+                holders = [(value, step) for value in values if isinstance(value, dict) and step in value]
+        found += holders
+    return found
 
 
 def _free_name(name: str, taken: Dict[str, bytes]) -> str:

@@ -170,18 +170,18 @@ class Transport:
 
 def error_of(answer: Answer) -> PenumbraError:
     """The exception for an answer that is no success: its problem+json, or what there is of it."""
-    detail, reason, request_id = "", "", answer.header("X-Request-Id")
+    detail, reason, path, request_id = "", "", "", answer.header("X-Request-Id")
     try:
         problem = json.loads(answer.body)
         if isinstance(problem, dict):
             detail, reason = str(problem.get("detail", "")), str(problem.get("reason", ""))
-            request_id = str(problem.get("request_id", request_id))
+            path, request_id = str(problem.get("path", "")), str(problem.get("request_id", request_id))
     except (ValueError, RecursionError):
         pass  # not the service itself, but something in front of it
     if not detail:
         start = _line(answer.body[:200].decode("utf-8", "replace"))
         detail = f"an answer without a problem description{': ' if start else ''}{start}"
-    error = class_for(answer.status)(detail, status=answer.status, reason=reason, request_id=request_id)
+    error = class_for(answer.status)(detail, status=answer.status, reason=reason, path=path, request_id=request_id)
     if isinstance(error, Overloaded):
         error.retry_after = _retry_after(answer.header("Retry-After"))
     return error

@@ -15,6 +15,7 @@ struct Problem {
     std::string reason;     // one word, the service's or the client's own ("connect", "timeout", "broken_answer")
     std::string request_id; // in the service's log; empty: there was no answer
     std::optional<double> retry_after_s;
+    std::string path = {}; // of the value in the scene that it is about ("light.half_u"); empty: it is about none
 };
 
 class Error : public std::runtime_error {

@@ -1,6 +1,7 @@
 // Scene files as `penumbra mask` reads them: names relative to the file become parts of the request.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <penumbra/client/file_places.hpp>
 #include <penumbra/client/images.hpp>
 
 namespace penumbra::client {
@@ -22,57 +24,24 @@ struct SceneFile {
 
 namespace detail {
 
-// The values of a scene that name files, found one section after the other. What is no text where a name belongs is left to the service to
-// refuse.
-class FileNames {
-public:
-    explicit FileNames(nlohmann::json& scene)
-    {
-        add_light(member(&scene, "light"));
-        each(member(&scene, "lights"), [&](nlohmann::json& light) { add_light(&light); });
-        add_occluders(&scene);
-        add(member(member(&scene, "receivers"), "depth"));
-        each(member(&scene, "objects"), [&](nlohmann::json& object) {
-            add(member(&object, "mesh"));
-            add(member(&object, "depth"));
-        });
+// The values at a place of file_places in `value`. What is no text where a name belongs is left to the service to refuse.
+inline void find_files(nlohmann::json& value, std::string_view place, std::vector<nlohmann::json*>& found)
+{
+    if (place.empty()) {
+        if (value.is_string()) found.push_back(&value);
+    } else if (place.starts_with("[]")) {
+        place.remove_prefix(place.starts_with("[].") ? 3 : 2);
+        if (!value.is_array()) return;
+        for (nlohmann::json& element : value) find_files(element, place, found);
+    } else {
+        const std::size_t end = std::min(place.find_first_of(".["), place.size());
+        const auto member = value.is_object() ? value.find(std::string(place.substr(0, end))) : value.end();
+        if (member == value.end()) return;
+        place.remove_prefix(end);
+        if (place.starts_with('.')) place.remove_prefix(1);
+        find_files(*member, place, found);
     }
-    const std::vector<nlohmann::json*>& found() const { return found_; }
-
-private:
-    static nlohmann::json* member(nlohmann::json* value, const char* key)
-    {
-        if (!value || !value->is_object()) return nullptr;
-        const auto found = value->find(key);
-        return found == value->end() ? nullptr : &*found;
-    }
-    template <class Visit> static void each(nlohmann::json* list, Visit visit)
-    {
-        if (!list || !list->is_array()) return;
-        for (nlohmann::json& element : *list) visit(element);
-    }
-    void add(nlohmann::json* value)
-    {
-        if (value && value->is_string()) found_.push_back(value);
-    }
-    // A light's emission is an image or a list of them; one of several may have occluders.
-    void add_light(nlohmann::json* light)
-    {
-        nlohmann::json* emission = member(light, "emission");
-        add(emission);
-        each(emission, [&](nlohmann::json& frame) { add(&frame); });
-        add_occluders(light);
-    }
-    void add_occluders(nlohmann::json* holder)
-    {
-        nlohmann::json* depth = member(member(holder, "occluders"), "depth");
-        add(member(depth, "front"));
-        add(member(depth, "back"));
-        each(member(depth, "layers"), [&](nlohmann::json& layer) { add(&layer); });
-    }
-
-    std::vector<nlohmann::json*> found_;
-};
+}
 
 // A name for a part that is not taken: the file's own, with what the service does not allow replaced by _. At most 120 characters, so that
 // a number still fits into the 128 that the service allows; the end stays, as it decides a mesh's format.
@@ -99,8 +68,9 @@ inline Images take_files(nlohmann::json& scene, const std::filesystem::path& fol
 {
     Images images;
     std::map<std::string, std::string> names; // by the file's real path
-    const detail::FileNames named(scene);
-    for (nlohmann::json* value : named.found()) {
+    std::vector<nlohmann::json*> found;
+    for (const std::string_view place : detail::file_places) detail::find_files(scene, place, found);
+    for (nlohmann::json* value : found) {
         const std::filesystem::path file = folder / value->get<std::string>();
         std::error_code ignored;
         std::string& name = names[std::filesystem::weakly_canonical(file, ignored).string()];

@@ -190,6 +190,7 @@ inline Problem problem_of(const httplib::Response& answer)
     const nlohmann::json json = nlohmann::json::parse(answer.body, nullptr, false);
     Problem problem{answer.status, text_at(json, "detail"), text_at(json, "reason"), text_at(json, "request_id"),
                     retry_after_s(answer.get_header_value("Retry-After"))};
+    problem.path = text_at(json, "path");
     if (problem.request_id.empty()) problem.request_id = answer.get_header_value("X-Request-Id");
     if (problem.detail.empty()) {
         problem.detail = "an answer without a problem description";

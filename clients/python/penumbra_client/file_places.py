@@ -1,0 +1,18 @@
+"""Made by `penumbra_describe_scene --python` from the description of the scene file."""
+
+# Where a scene names files; [] is each element of a list.
+FILE_PLACES = (
+    "light.emission",
+    "light.emission[]",
+    "lights[].emission",
+    "lights[].emission[]",
+    "lights[].occluders.depth.front",
+    "lights[].occluders.depth.back",
+    "lights[].occluders.depth.layers[]",
+    "objects[].mesh",
+    "objects[].depth",
+    "occluders.depth.front",
+    "occluders.depth.back",
+    "occluders.depth.layers[]",
+    "receivers.depth",
+)

@@ -1,0 +1,321 @@
+// Cameras, encodings, depth images; and what every description has.
+#include "io/scene_description.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/depth.hpp"
+
+namespace penumbra::scene_file {
+namespace {
+
+constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
+constexpr std::int64_t max_resolution = 65536;
+
+Key tangents(bool required)
+{
+    return {.name = "tan_half_fov",
+            .type = Pair{},
+            .meaning = "tangents of the half angles, `[x, y]`, or one number for both",
+            .required = required,
+            .otherwise = required ? "" : "fitted to the objects",
+            .example = "[0.5, 0.5]"};
+}
+
+Form light_camera()
+{
+    return {.name = "light",
+            .of = "of a light's camera (half_extent and center are for directional lights)",
+            .meaning = "at the light's centre along its axis; image x along +u, image up along +v",
+            .keys = {kind("light"), tangents(false)}};
+}
+
+Form sun_camera()
+{
+    return {.name = "light, directional",
+            .of = "of a directional light's camera, which is orthographic",
+            .meaning = "the same for a directional light: orthographic",
+            .keys = {kind("light"),
+                     {.name = "half_extent",
+                      .type = Pair{},
+                      .meaning = "half the width and height, `[x, y]`, or one number for both",
+                      .unit = "length",
+                      .otherwise = "fitted to the objects",
+                      .example = "[4, 4]"},
+                     {.name = "center",
+                      .type = Numbers{3},
+                      .meaning = "the middle of the image plane, from which depth counts",
+                      .unit = "length",
+                      .otherwise = "fitted to the objects; the origin without any",
+                      .example = "[0, 9, 0]"}}};
+}
+
+Form looking_camera()
+{
+    return {.name = "pinhole, looking",
+            .of = "beside eye and target",
+            .meaning = "at `eye`, towards `target`",
+            .keys = {kind("pinhole"),
+                     {.name = "eye",
+                      .type = Numbers{3},
+                      .meaning = "where the camera is",
+                      .unit = "length",
+                      .required = true,
+                      .example = "[0, 2, 5]"},
+                     {.name = "target",
+                      .type = Numbers{3},
+                      .meaning = "what it looks at; not where `eye` is",
+                      .unit = "length",
+                      .required = true,
+                      .example = "[0, 0, 0]"},
+                     {.name = "up",
+                      .type = Numbers{3},
+                      .meaning = "upwards in the image; not along the line of sight",
+                      .fallback = "[0, 1, 0]",
+                      .example = "[1, 0, 0]"},
+                     {.name = "vertical_fov_deg",
+                      .type = Number{.low = 0, .high = 180, .above_low = true, .below_high = true},
+                      .meaning = "the image's whole height; the width follows its pixels",
+                      .unit = "degrees",
+                      .required = true,
+                      .example = "40"}}};
+}
+
+Form matrix_camera()
+{
+    return {.name = "pinhole, by matrix",
+            .of = "beside world_from_camera",
+            .meaning = "placed by a matrix",
+            .keys = {kind("pinhole"),
+                     {.name = "world_from_camera",
+                      .type = Numbers{16},
+                      .meaning = "row-major, for column vectors: translation in elements 3, 7, 11; rigid, last row 0, 0, 0, 1",
+                      .required = true,
+                      .example = "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1]"},
+                     tangents(true)}};
+}
+
+// Every encoding has these.
+std::vector<Key> stored(std::vector<Key> keys)
+{
+    keys.push_back({.name = "scale",
+                    .type = Number{.low = 0, .above_low = true},
+                    .meaning = "multiplies the decoded depth",
+                    .fallback = "1",
+                    .example = "0.5"});
+    keys.push_back({.name = "empty",
+                    .type = Number{},
+                    .meaning = "the stored value that means nothing there",
+                    .otherwise = "what is not finite, not positive, or at least 1e9 (in a half-float image 65504)",
+                    .example = "0"});
+    keys.push_back({.name = "channel",
+                    .type = Text{},
+                    .meaning = "the image's channel",
+                    .otherwise = "`Z`, `depth.Z`, `*.Depth.Z`, or the only one beside alpha",
+                    .example = "\"Z\""});
+    return keys;
+}
+
+Key near(bool zero_allowed)
+{
+    return {.name = "near",
+            .type = Number{.low = 0, .above_low = !zero_allowed},
+            .meaning = "the depth that the nearest value stands for; below `far`",
+            .unit = "length",
+            .required = true,
+            .example = "0.5"};
+}
+
+Key far(bool required)
+{
+    return {.name = "far",
+            .type = Number{.low = 0, .above_low = true},
+            .meaning = "the depth that the furthest value stands for",
+            .unit = "length",
+            .required = required,
+            .otherwise = required ? "" : "infinite",
+            .example = "100"};
+}
+
+// The keys that occluders and receivers share, around their depth.
+std::vector<Key> viewed(std::string_view camera_meaning, std::string_view resolution, Key depth)
+{
+    return {{.name = "camera",
+             .type = One{camera},
+             .meaning = camera_meaning,
+             .fallback = R"({"kind": "light"})",
+             .example = R"({"kind": "light", "tan_half_fov": 0.5})"},
+            {.name = "resolution",
+             .type = Size{1, max_resolution},
+             .meaning = "`[width, height]`; images of another size are an error",
+             .unit = "pixels",
+             .otherwise = resolution,
+             .example = "[256, 256]"},
+            std::move(depth),
+            {.name = "encoding",
+             .type = One{encoding},
+             .meaning = "how these images store depth",
+             .fallback = R"({"kind": "planar"})",
+             .example = R"({"kind": "radial"})"}};
+}
+
+// Without the zeros behind the point.
+std::string text(double value)
+{
+    std::string digits = std::to_string(value);
+    digits.erase(digits.find_last_not_of('0') + 1);
+    if (digits.ends_with('.')) digits.pop_back();
+    return digits;
+}
+
+void add_places(const Object& object, const std::string& prefix, std::vector<std::string>& places)
+{
+    const auto add = [&places](std::string place) {
+        if (std::ranges::find(places, place) == places.end()) places.push_back(std::move(place));
+    };
+    for (const Form& form : object.forms)
+        for (const Key& key : form.keys) {
+            const std::string at = prefix + std::string(key.name);
+            if (std::holds_alternative<File>(key.type)) add(at);
+            if (const auto* files = std::get_if<Files>(&key.type)) {
+                if (files->or_one) add(at);
+                add(at + "[]");
+            }
+            if (const auto* one = std::get_if<One>(&key.type)) add_places(one->object(), at + ".", places);
+            if (const auto* list = std::get_if<List>(&key.type)) add_places(list->object(), at + "[].", places);
+        }
+}
+
+} // namespace
+
+Key kind(std::string_view name) { return {.name = "kind", .type = Constant{name}, .meaning = "decides the other keys", .required = true}; }
+
+const Object& camera()
+{
+    static const Object object{"camera",
+                               "What an image is seen through. It looks along its local -Z with +Y up; image row 0 is the top.",
+                               {light_camera(), sun_camera(), looking_camera(), matrix_camera()}};
+    return object;
+}
+
+const Object& encoding()
+{
+    const auto form = [](std::string_view name, std::string_view of, std::string_view meaning, std::vector<Key> range) {
+        range.insert(range.begin(), kind(name));
+        return Form{.name = name, .of = of, .meaning = meaning, .keys = stored(std::move(range))};
+    };
+    static const Object object{
+        "encoding",
+        "How an image stores depth: positive and planar unless `kind` says otherwise.",
+        {form("planar", "of planar depth", "distance along the viewing axis", {}),
+         form("radial", "of radial depth", "distance to the camera's centre; needs a perspective camera with its field of view", {}),
+         form("disparity", "of disparity depth", "1 / planar depth", {}),
+         form("window", "of window depth", "a depth buffer, 0 at `near`, 1 at `far`", {near(false), far(true)}),
+         form("reversed_window", "of reversed_window depth", "a depth buffer, 1 at `near`, 0 at `far`", {near(false), far(false)}),
+         form("normalized", "of normalized depth", "0 at `near`, 1 at `far`, linear", {near(true), far(true)})}};
+    static_assert(static_cast<int>(EncodingKind::normalized) == 5, "the forms are in the order of EncodingKind");
+    return object;
+}
+
+const Object& occluder_depth()
+{
+    static const Object object{"occluder_depth",
+                               "Depth of what casts, seen from the light.",
+                               {{.name = "depth",
+                                 .of = {},
+                                 .meaning = {},
+                                 .keys = {{.name = "front",
+                                           .type = File{},
+                                           .meaning = "nearest surfaces",
+                                           .otherwise = "rendered from `objects`",
+                                           .example = "\"front.exr\""},
+                                          {.name = "back",
+                                           .type = File{},
+                                           .meaning = "furthest back-facing surfaces",
+                                           .otherwise = "rendered from `objects`",
+                                           .example = "\"back.exr\""},
+                                          {.name = "layers",
+                                           .type = Files{0, any_number, false},
+                                           .meaning = "further surfaces in order of depth",
+                                           .fallback = "[]",
+                                           .example = "[\"layer.exr\"]"}}}}};
+    return object;
+}
+
+const Object& occluders()
+{
+    static const Object object{
+        "occluders",
+        "Depth of what casts shadows, seen from the light.",
+        {{.name = "occluders",
+          .of = {},
+          .meaning = {},
+          .keys = viewed("the light's own view; a `pinhole` must be the same view", "the images' size; `[256, 256]` without any",
+                         {.name = "depth",
+                          .type = One{occluder_depth},
+                          .meaning = "images of depth",
+                          .otherwise = "rendered from `objects`",
+                          .example = R"({"front": "front.exr"})"})}}};
+    return object;
+}
+
+const Object& receivers()
+{
+    static const Object object{"receivers",
+                               "Depth of what is shaded. The mask has its viewpoint and resolution.",
+                               {{.name = "receivers",
+                                 .of = {},
+                                 .meaning = {},
+                                 .keys = viewed("the viewpoint", "the image's size; `[512, 512]` without one",
+                                                {.name = "depth",
+                                                 .type = File{},
+                                                 .meaning = "image of depth",
+                                                 .otherwise = "rendered from `objects`",
+                                                 .example = "\"receiver.exr\""})}}};
+    return object;
+}
+
+std::string_view kind_of(const Form& form)
+{
+    for (const Key& key : form.keys)
+        if (const auto* constant = std::get_if<Constant>(&key.type))
+            if (const auto* text = std::get_if<std::string_view>(&constant->value)) return *text;
+    return {};
+}
+
+std::vector<std::string_view> kinds_of(const Object& object)
+{
+    std::vector<std::string_view> kinds;
+    for (const Form& form : object.forms)
+        if (const std::string_view kind = kind_of(form); !kind.empty() && std::ranges::find(kinds, kind) == kinds.end())
+            kinds.push_back(kind);
+    return kinds;
+}
+
+std::string expected(const Number& number)
+{
+    const bool low = std::isfinite(number.low), high = std::isfinite(number.high);
+    std::string words = "a number";
+    if (low) words += number.above_low ? " above " + text(number.low) : ", " + text(number.low) + " or more";
+    if (high) words += (low ? " and " : " ") + (number.below_high ? "below " + text(number.high) : text(number.high) + " or less");
+    return words;
+}
+
+std::string expected(const OneOfIntegers& integers)
+{
+    std::string list;
+    for (const int value : integers.values) list += (list.empty() ? "" : ", ") + std::to_string(value);
+    return "one of " + list;
+}
+
+const std::vector<std::string>& file_places()
+{
+    static const std::vector<std::string> all = [] {
+        std::vector<std::string> places;
+        add_places(scene(), "", places);
+        return places;
+    }();
+    return all;
+}
+
+} // namespace penumbra::scene_file
