@@ -36,22 +36,6 @@ std::optional<std::string_view> take_name(std::span<const std::byte>& rest)
     return text.substr(0, length);
 }
 
-// What every header must have, by OpenEXR's file layout.
-struct Required {
-    std::string_view name, type;
-    std::size_t size; // 0: any
-};
-constexpr std::array<Required, 8> required{{
-    {"channels", "chlist", 0},
-    {"compression", "compression", 1},
-    {"dataWindow", "box2i", 16},
-    {"displayWindow", "box2i", 16},
-    {"lineOrder", "lineOrder", 1},
-    {"pixelAspectRatio", "float", 4},
-    {"screenWindowCenter", "v2f", 8},
-    {"screenWindowWidth", "float", 4},
-}};
-
 // Attribute types of one size. OpenEXR reads that many bytes whatever the attribute says, so after another size it would take the middle of
 // something for an attribute, and allocate by what it finds there.
 struct Sized {
@@ -104,72 +88,6 @@ bool has_its_size(std::string_view type, std::span<const std::byte> value)
     return true;
 }
 
-// A chlist: name, type, a byte and three of padding, two steps of subsampling; an empty name ends it. Nothing for what is not plain.
-std::vector<ExrChannel> plain_channels(std::span<const std::byte> list)
-{
-    constexpr std::array types{SampleType::uint32, SampleType::float16, SampleType::float32};
-    std::vector<ExrChannel> channels;
-    for (;;) {
-        const std::optional<std::string_view> name = take_name(list);
-        if (name && name->empty() && list.empty()) return channels;
-        if (!name || name->empty() || list.size() < 16) return {};
-        const std::uint32_t type = little_endian(list);
-        if (type >= types.size() || little_endian(list.subspan(8)) != 1 || little_endian(list.subspan(12)) != 1) return {};
-        if (!channels.empty() && *name <= channels.back().name)
-            return {}; // OpenEXR takes rows to be sorted by name, whatever the list says
-        channels.push_back({std::string(*name), types[type]});
-        list = list.subspan(16);
-    }
-}
-
-// Collects what a plain file's pixels are read by.
-class PlainHeader {
-public:
-    explicit PlainHeader(std::uint32_t version)
-    {
-        constexpr std::uint32_t long_names = 0x400;
-        odd_ = (version & ~long_names) != 2;
-    }
-
-    void add(std::string_view name, std::string_view type, std::span<const std::byte> value)
-    {
-        const auto found = std::ranges::find(required, name, &Required::name);
-        if (found == required.end()) {
-            // What would turn the pixels, or make them something else than scanlines.
-            odd_ |= name == "Orientation" || name == "orientation" || name == "tiles" || name == "type" || name == "chunkCount";
-            return;
-        }
-        std::span<const std::byte>& place = values_[static_cast<std::size_t>(found - required.begin())];
-        odd_ |= type != found->type || (found->size != 0 && value.size() != found->size) || place.data() != nullptr;
-        place = value;
-    }
-
-    // `end`: the header's length.
-    ExrHeader header(std::size_t end) const
-    {
-        if (odd_ || std::ranges::any_of(values_, [](const auto& value) { return value.data() == nullptr; })) return {};
-        const auto& [channels, compression, data, display, line_order, ratio, center, width] = values_;
-        constexpr int decreasing_rows = 1;
-        if (std::to_integer<int>(line_order[0]) > decreasing_rows || !std::ranges::equal(data, display)) return {};
-
-        ExrHeader header{
-            .plain = true, .compression = std::to_integer<int>(compression[0]), .channels = plain_channels(channels), .end = end};
-        const std::int64_t columns = std::int64_t{integer(data.subspan(8))} - integer(data) + 1;
-        const std::int64_t rows = std::int64_t{integer(data.subspan(12))} - integer(data.subspan(4)) + 1;
-        // OpenEXR itself goes no further.
-        constexpr std::int64_t largest_side = INT32_MAX / 2;
-        if (header.channels.empty() || columns > largest_side || rows > largest_side) return {};
-        header.width = static_cast<int>(columns);
-        header.height = static_cast<int>(rows);
-        header.first_row = integer(data.subspan(4));
-        return header;
-    }
-
-private:
-    bool odd_ = false;
-    std::array<std::span<const std::byte>, required.size()> values_;
-};
-
 class HeaderReader {
 public:
     HeaderReader(std::span<const std::byte> exr, std::string_view where, std::uint64_t max_samples)
@@ -178,17 +96,14 @@ public:
     }
 
     // Magic, version and flags; then for each part attributes up to an empty name; several parts end in one more.
-    ExrHeader check()
+    void check()
     {
         take(4);
-        const std::uint32_t version = little_endian(take(4));
-        const bool several_parts = (version & 0x1000) != 0;
-        PlainHeader plain(version);
+        const bool several_parts = (little_endian(take(4)) & 0x1000) != 0;
         do {
-            while (check_attribute(plain)) {
+            while (check_attribute()) {
             }
         } while (several_parts && !at_end_of_parts());
-        return plain.header(file_size_ - rest_.size());
     }
 
 private:
@@ -215,7 +130,7 @@ private:
     bool at_end_of_parts() const { return rest_.empty() || rest_.front() == std::byte{0}; }
 
     // False at the end of a part.
-    bool check_attribute(PlainHeader& plain)
+    bool check_attribute()
     {
         const std::string_view attribute = name();
         if (attribute.empty()) return false;
@@ -228,7 +143,6 @@ private:
             check_area(little_endian(value), little_endian(value.subspan(4)), "tiles");
         if (attribute == "chunkCount" && type == "int" && value.size() == 4 && little_endian(value) > file_size_ / bytes_per_chunk)
             throw broken("its EXR header claims " + std::to_string(little_endian(value)) + " chunks");
-        plain.add(attribute, type, value);
         return true;
     }
 
@@ -259,9 +173,9 @@ private:
 
 } // namespace
 
-ExrHeader check_exr_header(std::span<const std::byte> exr, std::string_view where, std::uint64_t max_samples)
+void check_exr_header(std::span<const std::byte> exr, std::string_view where, std::uint64_t max_samples)
 {
-    return HeaderReader(exr, where, max_samples).check();
+    HeaderReader(exr, where, max_samples).check();
 }
 
 } // namespace penumbra

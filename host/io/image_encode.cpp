@@ -2,16 +2,14 @@
 #include "io/image_io.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
-#include <memory>
-
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 
 #include <penumbra/error.hpp>
 
+#include "io/exr_write.hpp"
 #include "io/image_format.hpp"
+#include "io/openimageio/openimageio.hpp"
 #include "io/pfm.hpp"
 #include "io/png.hpp"
 
@@ -71,7 +69,7 @@ void round_to_shared_exponent(float* rgb)
 }
 
 // Three equal channels where there is one: Radiance knows no other.
-std::vector<float> radiance_pixels(const Image& image)
+Image radiance_image(const Image& image)
 {
     std::vector<float> rgb(image.pixel_count() * 3);
     const std::size_t channels = static_cast<std::size_t>(image.channels);
@@ -79,49 +77,13 @@ std::vector<float> radiance_pixels(const Image& image)
         for (std::size_t c = 0; c < 3; ++c) rgb[3 * i + c] = image.pixels[i * channels + std::min(c, channels - 1)];
         round_to_shared_exponent(&rgb[3 * i]);
     }
-    return rgb;
+    return {image.width, image.height, 3, std::move(rgb)};
 }
 
-std::vector<float> clamped(const std::vector<float>& values)
+Image clamped(Image image)
 {
-    std::vector<float> result(values);
-    for (float& value : result) value = std::clamp(value, 0.0f, 1.0f);
-    return result;
-}
-
-OIIO::TypeDesc stored_type(const OutputFormat& format)
-{
-    if (holds_integers(format)) return format.bits == 8 ? OIIO::TypeUInt8 : OIIO::TypeUInt16;
-    return format.bits == 16 ? OIIO::TypeHalf : OIIO::TypeFloat;
-}
-
-// ZIP at zlib's fastest level (docs/bench.md has times and sizes). No date: the same pixels make the same bytes.
-OIIO::ImageSpec spec_for(const Image& image, const OutputFormat& format)
-{
-    OIIO::ImageSpec spec(image.width, image.height, format.format == "hdr" ? 3 : image.channels, stored_type(format));
-    spec.attribute("oiio:ColorSpace", "Linear");
-    spec.attribute("oiio:UnassociatedAlpha", 1); // samples as they stand
-    if (format.format == "exr") spec.attribute("compression", "zip:1");
-    if (format.format == "tif") spec.attribute("tiff:zipquality", 1);
-    // Left out, OpenImageIO writes the time of day. These blanks are Exif's way to say that it is not known.
-    spec.attribute("DateTime", "    :  :     :  :  ");
-    return spec;
-}
-
-std::vector<std::byte> encode(const OIIO::ImageSpec& spec, const std::vector<float>& pixels, const OutputFormat& format)
-{
-    configure_openimageio();
-    const std::string name = plugin(format_of(format));
-    std::vector<unsigned char> buffer;
-    OIIO::Filesystem::IOVecOutput memory(buffer);
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(name);
-    if (!output || !output->set_ioproxy(&memory) || !output->open("image." + name, spec) ||
-        !output->write_image(OIIO::TypeFloat, pixels.data()) || !output->close())
-        throw Error(ErrorCode::output,
-                    "the image cannot be written as " + format.format + ": " + (output ? output->geterror() : OIIO::geterror()));
-    std::vector<std::byte> bytes(buffer.size());
-    std::memcpy(bytes.data(), buffer.data(), buffer.size());
-    return bytes;
+    for (float& value : image.pixels) value = std::clamp(value, 0.0f, 1.0f);
+    return image;
 }
 
 } // namespace
@@ -134,28 +96,26 @@ std::vector<std::byte> encode_image(const Image& image, const OutputFormat& requ
     if (holds_integers(format)) {
         check_values(image, title, "0 to 1", [](float v) { return v >= -rounding_noise && v <= 1 + rounding_noise; });
         if (format.format == "png") return encode_png(image, format.bits);
-        return encode(spec_for(image, format), clamped(image.pixels), format);
+        return openimageio().encode(clamped(image), ImageFormat::tiff, format.bits);
     }
     if (format.format == "pfm") return encode_pfm(image);
     if (format.format == "hdr") {
         check_values(image, title, "finite values from 0 on", [](float v) { return v >= 0 && v <= 1e38f; });
-        return encode(spec_for(image, format), radiance_pixels(image), format);
+        return openimageio().encode(radiance_image(image), ImageFormat::hdr, format.bits);
     }
+    if (format.format == "tif") return openimageio().encode(image, ImageFormat::tiff, format.bits);
     // Infinity and NaN are kept as such; what is finite must stay so.
     if (format.bits == 16)
         check_values(image, title, "values up to 65504", [](float v) { return !std::isfinite(v) || std::abs(v) <= largest_half; });
-    return encode(spec_for(image, format), image.pixels, format);
+    static constexpr const char *grey[] = {"Y", "A"}, *colours[] = {"R", "G", "B", "A"};
+    return encode_exr(image, format.bits, {image.channels < 3 ? grey : colours, static_cast<std::size_t>(image.channels)});
 }
 
 std::vector<std::byte> encode_depth(const DepthMap& depth)
 {
     const Image image{depth.width, depth.height, 1, depth.depth};
-    const OutputFormat format{"exr", 32};
-    check_shape(image, format);
-    OIIO::ImageSpec spec = spec_for(image, format);
-    spec.channelnames = {"Z"};
-    spec.z_channel = 0;
-    return encode(spec, image.pixels, format);
+    check_shape(image, {"exr", 32});
+    return encode_exr(image, 32, std::array{"Z"});
 }
 
 void write_image(const std::string& path, const Image& image, const OutputFormat& format)

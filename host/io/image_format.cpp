@@ -4,9 +4,6 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <mutex>
-
-#include <OpenImageIO/imageio.h>
 
 #include <penumbra/error.hpp>
 
@@ -59,22 +56,6 @@ ImageFormat sniff(std::span<const std::byte> bytes)
     return ImageFormat::unknown;
 }
 
-std::string plugin(ImageFormat format)
-{
-    switch (format) {
-    case ImageFormat::exr:
-        return "openexr";
-    case ImageFormat::tiff:
-        return "tiff";
-    case ImageFormat::png:
-        return "png";
-    case ImageFormat::hdr:
-        return "hdr";
-    default:
-        return {};
-    }
-}
-
 ImageFormat format_of(const OutputFormat& output)
 {
     const WrittenFormat* found = find(output.format);
@@ -103,16 +84,6 @@ OutputFormat by_extension(OutputFormat output, const std::string& path)
         throw Error(ErrorCode::usage, path + ": has no extension that names an image format", std::string(formats_hint));
     output.format = lower(extension.substr(1));
     return output;
-}
-
-void configure_openimageio()
-{
-    static std::once_flag once;
-    std::call_once(once, [] {
-        OIIO::attribute("threads", 1);
-        OIIO::attribute("exr_threads", 1);
-        OIIO::attribute("try_all_readers", 0);
-    });
 }
 
 } // namespace penumbra

@@ -15,9 +15,6 @@ enum class ImageFormat { unknown, exr, tiff, png, pfm, hdr };
 // By the first bytes.
 ImageFormat sniff(std::span<const std::byte> bytes);
 
-// OpenImageIO's plugin; empty for PFM, which is ours.
-std::string plugin(ImageFormat format);
-
 ImageFormat format_of(const OutputFormat& output);
 
 // `output` with its format in the short spelling and its bits filled in. Throws usage for a format or bits that do not exist, listing those
@@ -26,8 +23,5 @@ OutputFormat checked(const OutputFormat& output, std::string_view where);
 
 // Where the format is left out, the one that the extension of `path` names.
 OutputFormat by_extension(OutputFormat output, const std::string& path);
-
-// Settings that OpenImageIO keeps for the whole process: one thread, no other reader than the one asked for. Set on first use.
-void configure_openimageio();
 
 } // namespace penumbra

@@ -1,4 +1,4 @@
-// Images through OpenImageIO, from bytes; the format is decided by the first bytes, never by a name.
+// Images from bytes and to bytes; the format is decided by the first bytes, never by a name.
 #pragma once
 
 #include <cstddef>

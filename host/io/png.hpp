@@ -1,4 +1,4 @@
-// PNG files: made, and looked at before they are decoded.
+// PNG files: read by libspng; written by code of our own, which libdeflate makes several times as fast as zlib would.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,16 @@ namespace penumbra {
 // same pixels. OpenImageIO takes several times as long: zlib at level 6, and all five filters tried (docs/bench.md has times and sizes).
 std::vector<std::byte> encode_png(const Image& image, int bits);
 
-// The same pixels as a PNG that libpng reads without a complaint, which it would print: nothing but IHDR, PLTE, tRNS, IDAT (unpacked and
-// checked: libdeflate is faster than zlib) and IEND. Colour profiles, gamma, text and Exif go: samples are read as they stand. `png` begins
-// with PNG's signature. Throws too_large for more than max_samples samples, before anything is unpacked, and invalid_input for a file that
-// is truncated or broken.
-std::vector<std::byte> unpacked_png(std::span<const std::byte> png, std::string_view where, std::uint64_t max_samples);
+struct PngImage {
+    int width = 0, height = 0;
+    int channels = 1;           // grey or RGB, and alpha behind it
+    int bits = 8;               // 8 or 16
+    std::vector<float> samples; // integers
+};
+
+// Samples as they stand: colour profiles and gamma are not applied. Palettes become colours, a transparent colour becomes alpha, and 1, 2
+// and 4 bits become 8. Throws too_large for more than max_samples samples, before any is decoded, and invalid_input for a file that is
+// truncated or broken.
+PngImage decode_png(std::span<const std::byte> png, std::string_view where, std::uint64_t max_samples);
 
 } // namespace penumbra
