@@ -105,7 +105,11 @@ std::vector<Key> listed_keys()
 std::vector<Key> placed(std::vector<Key> keys)
 {
     const std::array<Key, 5> further{
-        {{.name = "scale", .type = Number{.low = 0, .above_low = true}, .meaning = "of its size", .fallback = "1", .example = "2"},
+        {{.name = "scale",
+          .type = Number{.low = 0, .above_low = true},
+          .meaning = "a factor, for all three axes",
+          .fallback = "1",
+          .example = "2"},
          {.name = "rotate_deg",
           .type = Numbers{3},
           .meaning = "about X, then Y, then Z; after `scale`",
