@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
 
-Key center(std::string_view meaning)
+Key center()
 {
-    return {.name = "center", .type = Numbers{3}, .meaning = meaning, .unit = "length", .required = true, .example = "[0, 6, 0]"};
+    return {.name = "center", .type = Numbers{3}, .meaning = "its middle", .unit = "length", .required = true, .example = "[0, 6, 0]"};
 }
 
 std::vector<Key> axes()
@@ -43,7 +43,7 @@ Form rectangle()
         .of = "of a rectangle",
         .meaning = "shines along normalize(cross(half_v, half_u))",
         .keys = {kind("rectangle"),
-                 center("the middle"),
+                 center(),
                  {.name = "half_u", .type = Numbers{3}, .meaning = edges, .unit = "length", .required = true, .example = "[0.5, 0, 0]"},
                  {.name = "half_v", .type = Numbers{3}, .meaning = edges, .unit = "length", .required = true, .example = "[0, 0, -0.5]"},
                  {.name = "emission",
@@ -61,14 +61,14 @@ std::vector<Form> light_forms()
              .of = "of a sphere",
              .meaning = "counts as the disc of its radius that faces the receiver",
              .keys = with_axes({kind("sphere"),
-                                center("the middle"),
+                                center(),
                                 {.name = "radius",
                                  .type = Number{.low = 0},
                                  .meaning = "0: a point light",
                                  .unit = "length",
                                  .required = true,
                                  .example = "0.5"}})},
-            {.name = "point", .of = "of a point", .meaning = "no extent", .keys = with_axes({kind("point"), center("where it is")})},
+            {.name = "point", .of = "of a point", .meaning = "no extent", .keys = with_axes({kind("point"), center()})},
             {.name = "directional",
              .of = "of a directional light",
              .meaning = "a disc of directions, from everywhere the same",
@@ -105,7 +105,11 @@ std::vector<Key> listed_keys()
 std::vector<Key> placed(std::vector<Key> keys)
 {
     const std::array<Key, 5> further{
-        {{.name = "scale", .type = Number{.low = 0, .above_low = true}, .meaning = "of its size", .fallback = "1", .example = "2"},
+        {{.name = "scale",
+          .type = Number{.low = 0, .above_low = true},
+          .meaning = "a factor, for all three axes",
+          .fallback = "1",
+          .example = "2"},
          {.name = "rotate_deg",
           .type = Numbers{3},
           .meaning = "about X, then Y, then Z; after `scale`",

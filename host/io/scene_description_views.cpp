@@ -16,7 +16,7 @@ Key tangents(bool required)
 {
     return {.name = "tan_half_fov",
             .type = Pair{},
-            .meaning = "tangents of the half angles, `[x, y]`, or one number for both",
+            .meaning = "tangents of the half angles",
             .required = required,
             .otherwise = required ? "" : "fitted to the objects",
             .example = "[0.5, 0.5]"};
@@ -38,7 +38,7 @@ Form sun_camera()
             .keys = {kind("light"),
                      {.name = "half_extent",
                       .type = Pair{},
-                      .meaning = "half the width and height, `[x, y]`, or one number for both",
+                      .meaning = "half the width and height",
                       .unit = "length",
                       .otherwise = "fitted to the objects",
                       .example = "[4, 4]"},

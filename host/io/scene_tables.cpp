@@ -66,7 +66,7 @@ struct TypeWords {
 
 std::string type_words(const Key& key)
 {
-    return std::visit(TypeWords{}, key.type) + (key.unit.empty() ? "" : ", ") + std::string(key.unit);
+    return std::visit(TypeWords{}, key.type) + (key.unit.empty() ? "" : " (" + std::string(key.unit) + ")");
 }
 
 std::string default_words(const Key& key)
