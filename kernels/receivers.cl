@@ -5,7 +5,7 @@
 #error "tile_bounds holds a row of a tile in a float16"
 #endif
 
-// receivers_from_depth: one light-space point a pixel (algorithms.md, "Light space").
+// receivers_from_depth: one light-space point a pixel.
 //
 //   depth  [height][width]   planar depth from the receivers' camera, scene units; not finite or not positive: nothing there
 //   xi, eta, d [rows][stride] light-space points; d = NO_RECEIVER for the padding, for nothing there, and behind the light's plane
@@ -59,7 +59,7 @@ inline float total(const float16 v)
 // tile_bounds: the box of light-space points that a tile of TILE_WIDTH x TILE_ROWS receivers holds.
 //
 //   nearest            the greatest disparity of the occluder map
-//   half_inverse_scale 1 / (2 k), of algorithms.md
+//   half_inverse_scale 1 / (2 k), k the light_scale of shared.h
 //   bounds [tiles][8]  least and greatest xi, eta, d; the number of receivers; the number of those that see part of the light through space
 //                      between them and the nearest occluder that the occluder map does not show. Without receivers: d from NO_RECEIVER to 0.
 //

@@ -71,9 +71,9 @@ typedef struct {
     float2 texel;              // width and height in xi and eta
 } Search;
 
-// How far the penumbra of a texel at disparity `nearest` reaches beyond its edges on the tile's furthest receivers (algorithms.md:
-// e = (d - d_p) / (2 k)). Widened by 2^-20, which covers the rounding of this search and of the pairs that it spares: a texel that it drops
-// would have added exactly 0. Negative: not above the furthest receiver, so none.
+// How far the penumbra of a texel at disparity `nearest` reaches beyond its edges on the tile's furthest receivers (through a
+// point at d_p a receiver sees the light e = (d - d_p) / (2 k) to either side). Widened by 2^-20, which covers the rounding of this search and
+// of the pairs that it spares: a texel that it drops would have added exactly 0. Negative: not above the furthest receiver, so none.
 inline float2 penumbra_extent(const Search search, const float nearest)
 {
     const float rise = nearest - search.box.s4;

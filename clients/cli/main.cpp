@@ -14,6 +14,7 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
+#include "scene/joined.hpp"
 #include "streams.hpp"
 #include "verbs.hpp"
 
@@ -53,8 +54,7 @@ int run(int argc, char** argv)
     const std::array verbs{mask_verb(program), depth_verb(program), compare_verb(program), batch_verb(program), info_verb(program)};
     program.footer(footer); // after the verbs, which would inherit it
 
-    std::string names;
-    for (const Verb& verb : verbs) names += (names.empty() ? "" : ", ") + verb.app->get_name();
+    const std::string names = joined(verbs, [](const Verb& verb) { return verb.app->get_name(); });
     if (argc < 2) throw wrong_usage("no verb given; expected one of " + names, program);
     const bool known = std::ranges::any_of(verbs, [&](const Verb& verb) { return verb.app->get_name() == argv[1]; });
     if (argv[1][0] != '-' && !known) throw wrong_usage("unknown verb \"" + std::string(argv[1]) + "\"; expected one of " + names, program);

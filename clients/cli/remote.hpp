@@ -15,9 +15,9 @@ struct RemoteScene {
 };
 
 // Sends the scene and the files that it names once for each mask, writes the answers as the service sent them, prints the warnings. Returns
-// the report's JSON: of the contract's keys those that an answer over HTTP has, and `server`, `request_id`, `round_trip_ms`; the resolution
-// and device only where `with_report`; for more than one mask {"masks": [...]}, as reports_json. The token is PENUMBRA_SERVER_TOKEN's.
-// Throws Error.
+// the report's JSON: of the keys of a report those that an answer over HTTP has, and `server`, `request_id`, `round_trip_ms`; the
+// resolution and device only where `with_report`; for more than one mask {"masks": [...]}, as reports_json. The token is
+// PENUMBRA_SERVER_TOKEN's. Throws Error.
 std::string masks_on_server(const RemoteScene& asked, const std::vector<MaskFile>& files, bool with_report);
 
 } // namespace penumbra::cli

@@ -7,6 +7,7 @@
 #include <penumbra/error.hpp>
 #include <penumbra/technique.hpp>
 
+#include "scene/joined.hpp"
 #include "technique/table.hpp"
 
 namespace penumbra::cli {
@@ -64,12 +65,7 @@ struct DomainText {
     std::string operator()(const Flag&) const { return "true or false"; }
     std::string operator()(const IntegerRange& range) const { return std::to_string(range.low) + " to " + std::to_string(range.high); }
     std::string operator()(const RealRange& range) const { return text_of(range.low) + " to " + text_of(range.high); }
-    std::string operator()(const Choices& choices) const
-    {
-        std::string text;
-        for (const std::string_view name : choices.names) text += (text.empty() ? "" : ", ") + std::string(name);
-        return text;
-    }
+    std::string operator()(const Choices& choices) const { return joined(choices.names); }
 };
 
 std::string key_help(const SettingKey& key, const Technique& defaults)
@@ -124,9 +120,7 @@ std::string technique_help()
 {
     std::string text = "Techniques, with the keys that --set takes (KEY=default):\n";
     for (const TechniqueRow& row : technique_table()) {
-        std::string lights;
-        for (const std::string_view light : row.lights) lights += (lights.empty() ? "" : ", ") + std::string(light);
-        text += "\n  " + std::string(row.kind) + "\n    " + std::string(row.summary) + "\n    Lights: " + lights +
+        text += "\n  " + std::string(row.kind) + "\n    " + std::string(row.summary) + "\n    Lights: " + joined(row.lights) +
                 (row.textured_lights ? " (textured too)" : "") + ". Needs: " + std::string(row.inputs) + "\n";
         for (const SettingKey& key : row.keys) text += key_help(key, row.defaults);
     }

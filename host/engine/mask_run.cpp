@@ -51,6 +51,18 @@ public:
         return static_cast<int>(most);
     }
 
+    // What goes wrong with a light of a list names its place there.
+    template <class Call> auto in_place(std::size_t index, const Call& call)
+    {
+        const MaskLight& light = job_.lights[index];
+        try {
+            return call();
+        } catch (const Error& error) {
+            if (!light.place) throw;
+            throw in_list(error, *light.place, light.own_occluders);
+        }
+    }
+
     // What is prepared for a light, and whether it was kept.
     std::pair<Prepared, bool> prepare(std::size_t index, int frame)
     {
@@ -64,18 +76,6 @@ public:
     }
 
 private:
-    // What goes wrong with a light of a list names its place there.
-    template <class Call> auto in_place(std::size_t index, const Call& call)
-    {
-        const MaskLight& light = job_.lights[index];
-        try {
-            return call();
-        } catch (const Error& error) {
-            if (!light.place) throw;
-            throw in_list(error, *light.place, light.own_occluders);
-        }
-    }
-
     void before(std::string_view next) const
     {
         if (before_) before_(next);

@@ -61,7 +61,7 @@ Json domain_json(const SettingKey& setting) { return std::visit(DomainJson{}, se
 
 Json default_json(const SettingKey& setting, const TechniqueRow& row) { return json_of(setting.get(row.defaults)); }
 
-// Keys and their order are the contract's (section 3); `pairs` is an addition and left out when it means nothing.
+// Scripts read the keys in this order; `pairs` came later and is left out when it means nothing.
 std::string report_json(const Report& report)
 {
     Json settings = Json::object();

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cctype>
 #include <cmath>
 #include <exception>
 #include <filesystem>
-#include <unordered_map>
 
 #include <assimp/BaseImporter.h>
 #include <assimp/Importer.hpp>
@@ -19,6 +17,7 @@
 #include "io/image_io.hpp"
 #include "io/ply.hpp"
 #include "io/polygon.hpp"
+#include "scene/weld.hpp"
 
 namespace penumbra {
 
@@ -75,48 +74,20 @@ void keep_only(Assimp::Importer& importer, std::string_view name)
     if (importer.GetImporterCount() == 0) throw Error(ErrorCode::internal, "Assimp lacks its " + std::string(name));
 }
 
-// Joins vertices at equal positions, whatever their normals and texture coordinates: silhouettes need the surface, not its seams.
-class Welder {
-public:
-    explicit Welder(TriangleMesh& mesh) : mesh_(mesh) {}
-
-    std::uint32_t index(Imath::V3f position)
-    {
-        position += Imath::V3f(0.0f); // -0 becomes 0
-        const auto [found, is_new] = known_.try_emplace(position, static_cast<std::uint32_t>(mesh_.positions.size()));
-        if (is_new) mesh_.positions.push_back(position);
-        return found->second;
-    }
-
-    void reserve(std::size_t count) { known_.reserve(count); }
-
-private:
-    struct Hash {
-        std::size_t operator()(const Imath::V3f& p) const
-        {
-            std::uint64_t hash = 0;
-            for (const float c : {p.x, p.y, p.z}) hash = (hash ^ std::bit_cast<std::uint32_t>(c)) * 0x9e3779b97f4a7c15u, hash ^= hash >> 29;
-            return static_cast<std::size_t>(hash);
-        }
-    };
-    TriangleMesh& mesh_;
-    std::unordered_map<Imath::V3f, std::uint32_t, Hash> known_;
-};
-
 // Appends polygons; those with fewer than three corners are points and lines and cast nothing. Triangles that collapse when vertices are
 // joined have no area and go.
 class Appender {
 public:
-    Appender(TriangleMesh& mesh, std::string_view where) : mesh_(mesh), where_(where), welder_(mesh) {}
+    Appender(TriangleMesh& mesh, std::string_view where) : mesh_(mesh), where_(where), weld_(mesh.positions) {}
 
-    void reserve(std::size_t vertices) { welder_.reserve(vertices); }
+    void reserve(std::size_t vertices) { weld_.reserve(vertices); }
 
     // The mesh's index of a vertex.
     std::uint32_t vertex(const Imath::V3f& position)
     {
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
             throw broken(where_, "has a vertex that is not finite");
-        return welder_.index(position);
+        return weld_(position);
     }
 
     void polygon(std::span<const std::uint32_t> corners, bool mirrored = false)
@@ -136,7 +107,7 @@ public:
 private:
     TriangleMesh& mesh_;
     std::string_view where_;
-    Welder welder_;
+    Welder weld_;
     std::vector<std::array<std::uint32_t, 3>> triangles_;
 };
 

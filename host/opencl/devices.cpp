@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "opencl/errors.hpp"
+#include "scene/joined.hpp"
 
 namespace penumbra::opencl {
 namespace {
@@ -35,12 +36,7 @@ std::string type_name(cl_device_type type)
 // "0: pthread-skylake-avx512, 1: NVIDIA H200"
 std::string listing(const std::vector<FoundDevice>& devices)
 {
-    std::string text;
-    for (const FoundDevice& found : devices) {
-        if (!text.empty()) text += ", ";
-        text += std::to_string(found.info.index) + ": " + found.info.name;
-    }
-    return text;
+    return joined(devices, [](const FoundDevice& found) { return std::to_string(found.info.index) + ": " + found.info.name; });
 }
 
 const FoundDevice* find(const std::vector<FoundDevice>& devices, const std::string& selector)

@@ -3,12 +3,11 @@
 #include <cstdlib>
 #include <mutex>
 #include <string>
-#include <vector>
 
-#include <sched.h>
 #include <unistd.h>
 
 #include "opencl/cache_folder.hpp"
+#include "scene/parallel.hpp"
 
 namespace penumbra::opencl {
 namespace {
@@ -16,18 +15,6 @@ namespace {
 void set_unless_set(const char* name, const std::string& value)
 {
     if (!value.empty()) setenv(name, value.c_str(), 0);
-}
-
-// Processors that this process may run on; 0 when the system does not say.
-int processors_allowed()
-{
-    // The kernel refuses a mask smaller than its own: try larger ones.
-    for (int size = CPU_SETSIZE; size <= 1 << 20; size *= 2) {
-        const std::size_t bytes = CPU_ALLOC_SIZE(size);
-        std::vector<cpu_set_t> mask(bytes / sizeof(cpu_set_t) + 1);
-        if (sched_getaffinity(0, bytes, mask.data()) == 0) return CPU_COUNT_S(bytes, mask.data());
-    }
-    return 0;
 }
 
 // A folder that PoCL can use: it crashes when its cache folder is missing or cannot be written, also with its cache turned off, and aborts
@@ -57,8 +44,7 @@ void prepare_environment()
         set_unless_set("POCL_SIGFPE_HANDLER", "0");
 
         // It takes as many threads as the machine has processors, whatever the process may use (taskset, batch systems, containers).
-        if (const int processors = processors_allowed(); processors > 0)
-            set_unless_set("POCL_MAX_PTHREAD_COUNT", std::to_string(processors));
+        set_unless_set("POCL_MAX_PTHREAD_COUNT", std::to_string(processor_count()));
 
         // By default /tmp/pocl where there is no HOME: a path that any user of the machine can make first, and fill with code.
         if (!std::getenv("POCL_CACHE_DIR")) set_unless_set("POCL_CACHE_DIR", pocl_folder());

@@ -9,7 +9,7 @@
 namespace penumbra {
 namespace {
 
-constexpr float far_away = 1e9f;         // at and above this a stored value means nothing there (contract.md, section 2)
+constexpr float far_away = 1e9f;         // at and above this a stored value means nothing there (docs/scene_file.md, encoding)
 constexpr float half_far_away = 65504.f; // the largest half-float
 
 bool in_unit_range(EncodingKind kind)

@@ -10,7 +10,7 @@ namespace penumbra {
 
 enum class EncodingKind { planar, radial, disparity, window, reversed_window, normalized };
 
-// How a depth image stores depth (contract.md, section 2). `empty`: the stored value that means nothing there.
+// How a depth image stores depth (docs/scene_file.md, encoding). `empty`: the stored value that means nothing there.
 struct DepthEncoding {
     EncodingKind kind = EncodingKind::planar;
     std::optional<double> near, far;

@@ -19,7 +19,7 @@ constexpr double degree = std::numbers::pi / 180;
 
 bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// Within 8 degrees of the Y axis the default up is -Z (contract.md, section 2).
+// Within 8 degrees of the Y axis the default up is -Z (docs/scene_file.md, light).
 Vec3 default_up(const Vec3& direction) { return std::abs(direction.y) > std::cos(8 * degree) ? Vec3(0, 0, -1) : Vec3(0, 1, 0); }
 
 void set_axes(LightFrame& frame, const Vec3& direction, const std::optional<Vec3>& up)

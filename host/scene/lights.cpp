@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "scene/joined.hpp"
 #include "scene/light_space.hpp"
 
 namespace penumbra {
@@ -22,13 +23,6 @@ bool is_name(std::string_view name)
         return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
     };
     return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits);
-}
-
-std::string names_of(std::span<const SceneLight> lights)
-{
-    std::string list;
-    for (const SceneLight& light : lights) list += (list.empty() ? "" : ", ") + light.name;
-    return list;
 }
 
 } // namespace
@@ -132,7 +126,8 @@ Scene only_light(Scene scene, std::string_view name)
     const auto found = std::ranges::find(scene.lights, name, &SceneLight::name);
     if (found == scene.lights.end())
         throw Error::at(ErrorCode::usage, "lights", "none has the name " + std::string(name),
-                        scene.lights.empty() ? "the scene has one light, without a name" : "there are: " + names_of(scene.lights));
+                        scene.lights.empty() ? "the scene has one light, without a name"
+                                             : "there are: " + joined(scene.lights, &SceneLight::name));
     scene.light = std::move(found->light);
     if (found->occluders) scene.occluders = std::move(*found->occluders);
     scene.lights.clear();

@@ -16,9 +16,8 @@
 #include <penumbra/error.hpp>
 
 namespace penumbra {
-namespace {
 
-unsigned affinity_count()
+unsigned processor_count()
 {
     // The mask's size is the kernel's choice: grow until it fits.
     for (int processors = CPU_SETSIZE; processors <= (1 << 20); processors *= 2) {
@@ -33,12 +32,10 @@ unsigned affinity_count()
     return std::max(std::thread::hardware_concurrency(), 1u);
 }
 
-} // namespace
-
 unsigned thread_count()
 {
     const char* const setting = std::getenv("PENUMBRA_THREADS");
-    if (!setting || !*setting) return affinity_count();
+    if (!setting || !*setting) return processor_count();
 
     const std::string_view text(setting);
     unsigned count = 0;

@@ -5,7 +5,11 @@
 
 namespace penumbra {
 
-// PENUMBRA_THREADS when set (1 to 1024), else the number of processors in the process's affinity mask.
+// How many processors this process may use (taskset, batch systems, containers), by its affinity mask; where the system hides that, how
+// many there are.
+unsigned processor_count();
+
+// PENUMBRA_THREADS when set (1 to 1024), else processor_count().
 unsigned thread_count();
 
 // Calls body(i) for 0 <= i < count, each once, from several threads; rethrows the first exception.

@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numeric>
 #include <string>
 
 #include <penumbra/error.hpp>
 
+#include "scene/weld.hpp"
 #include "silhouette/edges.hpp"
 
 namespace penumbra {
@@ -13,47 +13,6 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 using EdgeUse = Topology::EdgeUse;
-
-// One mesh's vertices, each place once: a hash table with linear probing, at most half full.
-class Welder {
-public:
-    Welder(std::size_t positions, std::vector<Imath::V3f>& vertices)
-        : vertices_(vertices), slots_(std::bit_ceil(2 * positions + 1), empty), mask_(slots_.size() - 1)
-    {
-    }
-
-    std::uint32_t operator()(const Imath::V3f& position)
-    {
-        const Imath::V3f place(position.x + 0.0f, position.y + 0.0f, position.z + 0.0f); // -0 becomes 0
-        std::size_t slot = hash(place) & mask_;
-        while (slots_[slot] != empty && vertices_[slots_[slot]] != place) slot = (slot + 1) & mask_;
-        if (slots_[slot] == empty) {
-            slots_[slot] = static_cast<std::uint32_t>(vertices_.size());
-            vertices_.push_back(place);
-        }
-        return slots_[slot];
-    }
-
-private:
-    static constexpr std::uint32_t empty = 0xffffffff;
-
-    // The finaliser of MurmurHash3, once for each half of the key.
-    static std::uint64_t mix(std::uint64_t h)
-    {
-        h = (h ^ (h >> 33)) * 0xff51afd7ed558ccdu;
-        h = (h ^ (h >> 33)) * 0xc4ceb9fe1a85ec53u;
-        return h ^ (h >> 33);
-    }
-    static std::size_t hash(const Imath::V3f& p)
-    {
-        const auto bits = [](float f) { return static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(f)); };
-        return static_cast<std::size_t>(mix(mix(bits(p.x) << 32 | bits(p.y)) ^ bits(p.z)));
-    }
-
-    std::vector<Imath::V3f>& vertices_;
-    std::vector<std::uint32_t> slots_;
-    std::size_t mask_;
-};
 
 bool finite(const Imath::V3f& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -202,7 +161,7 @@ Topology::Topology(std::span<const TriangleMesh* const> meshes)
 
     // Keep what has an area, each place once a mesh.
     for (const TriangleMesh* mesh : meshes) {
-        Welder weld(mesh->positions.size(), vertices_);
+        Welder weld(vertices_, mesh->positions.size());
         for (const Triangle& t : mesh->triangles) {
             const Imath::V3f &a = mesh->positions[t[0]], &b = mesh->positions[t[1]], &c = mesh->positions[t[2]];
             if (finite(a) && finite(b) && finite(c) && has_area(a, b, c)) {

@@ -46,8 +46,8 @@ struct MapSize {
 };
 MapSize reduced_size(int width, int height, int resolution);
 
-// k of algorithms.md for both axes. A light of no extent counts as one so small that every back-projected texel edge lies far outside it or
-// far inside the texel: 10^18 lights across at a disparity step of 1.
+// With k (light_scale of kernels/common/shared.h) for both axes. A light of no extent counts as one so small that every back-projected
+// texel edge lies far outside it or far inside the texel: 10^18 lights across at a disparity step of 1.
 OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
 
 // Disparity and covered share at `size`, and the surface's steps; depths are right to the relative `precision`.

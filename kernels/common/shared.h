@@ -34,7 +34,7 @@ typedef struct {
 typedef struct {
     int width, height;
     float texel_x, texel_y;         // a texel's width and height in xi and eta: 2 / width, 2 / height
-    float light_scale_x, light_scale_y; // k of algorithms.md: light extent tangents over the light's full width and height
+    float light_scale_x, light_scale_y; // k: light extent tangents over the light's full width and height
     float edge_on_x, edge_on_y;     // 1 / (2 k h): times a surface's disparity step a texel, 1 where the surface is edge-on to the light
 } OccluderView;
 

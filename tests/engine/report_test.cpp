@@ -1,4 +1,4 @@
-// The report's JSON, by the contract's section 3.
+// The report's JSON: the keys that scripts read.
 #include <nlohmann/json.hpp>
 
 #include <gtest/gtest.h>

@@ -134,7 +134,7 @@ TEST(WedgeTable, AWhiteTextureIsNoTexture)
 
 TEST(WedgeTable, APlanarCasterAgainstRays)
 {
-    // Stratified rays have an error of a few thousandths at 4096 (beyond.md gives .0015 to .0034 at 1024 for the mean); four times their
+    // Stratified rays have an error of a few thousandths at 4096 (.0015 to .0034 on average at 1024); four times their
     // mean is allowed.
     const RectangleLight light = textured(8, 8, 3, [](int x, int y, int c) {
         return (x / 2 + y / 2) % 2 == 0 ? 0.2F + 0.4F * static_cast<float>(c) : 1.0F - 0.3F * static_cast<float>(c);

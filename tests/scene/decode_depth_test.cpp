@@ -40,7 +40,7 @@ TEST(DecodeDepth, DisparityIsOneOver)
     EXPECT_EQ(map.depth, (std::vector<float>{16, 0.5f, nothing_there, nothing_there}));
 }
 
-// beyond.md: window depth w is affine in 1/z.
+// Window depth w is affine in 1/z: 0 at the near plane, 1 at the far one.
 TEST(DecodeDepth, WindowAndReversedWindow)
 {
     const double n = 0.1, f = 100;

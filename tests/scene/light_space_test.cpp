@@ -1,4 +1,4 @@
-// Lights as frames: axes by the contract, defaults, what is refused.
+// Lights as frames: axes as docs/scene_file.md says, defaults, what is refused.
 #include <numbers>
 
 #include "support/maps.hpp"
@@ -17,7 +17,7 @@ void expect_frame(const LightFrame& frame)
     expect_near(frame.v.cross(frame.u), frame.direction);
 }
 
-// The contract's example: half_u = +X, half_v = -Z shines down.
+// The example of docs/scene_file.md: half_u = +X, half_v = -Z shines down.
 TEST(LightFrame, RectangleShinesAlongVCrossU)
 {
     const LightFrame frame =
@@ -77,7 +77,7 @@ TEST(LightFrame, DefaultUp)
     expect_up({0, 0, -1}, {0, 1, 0});
     expect_up({1, 2, 3}, {0, 1, 0});
 
-    // Defaults shine down; with the contract's example, a point light and a rectangle then agree.
+    // Defaults shine down; with that example, a point light and a rectangle then agree.
     const LightFrame point = light_frame(PointLight{});
     expect_near(point.u, {1, 0, 0});
     expect_near(point.v, {0, 0, -1});

@@ -57,14 +57,19 @@ public:
         }
     }
     void end() { ::shutdown(socket_, SHUT_WR); }
-    // All until the other side ends; a test that waits a minute has failed.
+    // Until the other side has sent or ended; false after a minute: a test that waits so long has failed.
+    bool wait_for_bytes()
+    {
+        pollfd entry{socket_, POLLIN, 0};
+        return ::poll(&entry, 1, 60000) > 0;
+    }
+    // All until the other side ends.
     std::string receive()
     {
         std::string text;
         std::array<char, 65536> buffer{};
         for (;;) {
-            pollfd entry{socket_, POLLIN, 0};
-            if (::poll(&entry, 1, 60000) <= 0) return text + "(nothing came for a minute)";
+            if (!wait_for_bytes()) return text + "(nothing came for a minute)";
             const ssize_t got = ::recv(socket_, buffer.data(), buffer.size(), 0);
             if (got <= 0) return got == 0 ? text : text + "(reset)";
             text.append(buffer.data(), static_cast<std::size_t>(got));
@@ -203,7 +208,7 @@ inline int shared_port()
     return running.port;
 }
 
-// Waits until a line of /metrics says so.
+// Waits until a line of /metrics says so. Of what a service counts nothing tells from outside: it is asked again.
 inline void wait_for_metric(int port, const std::string& line)
 {
     for (int i = 0; i < 6000; ++i) {

@@ -135,7 +135,7 @@ TEST(Table, UnknownNamesListTheKnown)
     EXPECT_TRUE(holds(kind.message(), "technique.kind") && holds(kind.message(), "soft_shadow_mpa")) << kind.what();
     EXPECT_TRUE(holds(kind.hint(), "shadow_map, soft_shadow_map, soft_shadow_volume, occlusion_texture, smoothie, ray_traced"))
         << kind.what();
-    // Not built yet is unknown, like a typo (contract.md, section 2).
+    // Not built yet is unknown, like a typo (docs/scene_file.md, technique).
     EXPECT_EQ(error_of([] { technique_from({.kind = "auto", .settings = {}}); }).code(), ErrorCode::invalid_input);
 
     const Error key = error_of([] { technique_from({.kind = "shadow_map", .settings = {{"sides", std::string("both")}}}); });

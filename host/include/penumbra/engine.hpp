@@ -181,7 +181,7 @@ PENUMBRA_API Scene with_depth(const Scene& scene, const Technique& technique);
 // The receivers with their depth in place (rendered from the objects that receive where it is missing) and their camera resolved.
 PENUMBRA_API Receivers with_depth(const Receivers& receivers, const Light& light, const Geometry& geometry);
 
-// The report as the JSON of the contract (section 3).
+// The report as `penumbra mask --report` writes it: JSON.
 PENUMBRA_API std::string report_json(const Report& report);
 
 // The reports of several masks as {"masks": [...]}: each as above, with `light` and `frame` (null where there is none) and `file` in front.

@@ -1,8 +1,9 @@
 // Hostile clients, through real sockets: what each gets, and that others are served meanwhile.
+#include <condition_variable>
 #include <csignal>
 #include <memory>
+#include <mutex>
 
-#include "http/lobby.hpp"
 #include "http/metrics.hpp"
 #include "server/client.hpp"
 
@@ -24,9 +25,12 @@ public:
             sockets_.back()->send(begin);
         }
         thread_ = std::jthread([this](const std::stop_token& stop) {
+            std::mutex mutex;
+            std::condition_variable_any pace;
+            std::unique_lock lock(mutex);
             for (std::size_t at = 0; !stop.stop_requested(); ++at) {
                 for (const auto& socket : sockets_) socket->send(text_.substr(at % text_.size(), 1));
-                std::this_thread::sleep_for(std::chrono::milliseconds(250));
+                pace.wait_for(lock, stop, std::chrono::milliseconds(250), [] { return false; });
             }
         });
     }
@@ -172,7 +176,7 @@ TEST(Attack, ABodyAfterAnEarlyAnswerIsNoRequest)
     Socket socket(shared_port());
     const std::string hidden = "GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
     socket.send("GET /secret HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " + std::to_string(hidden.size()) + "\r\n\r\n");
-    std::this_thread::sleep_for(std::chrono::milliseconds(100)); // the answer is on its way
+    socket.wait_for_bytes();
     socket.send(hidden);
     const std::string text = socket.receive();
     EXPECT_TRUE(text.starts_with("HTTP/1.1 404 "));
@@ -183,67 +187,6 @@ TEST(Attack, TwoServicesDoNotShareAPort)
 {
     server::Service second(server::Options{.port = shared_port(), .device = {}, .token = {}}, Engine(), [](std::string_view) {});
     EXPECT_THROW(second.bind(), Error);
-}
-
-// --- The lobby by itself --------------------------------------------------------------------------------------------------------------
-
-struct Pair {
-    std::array<int, 2> ends{};
-    Pair() { EXPECT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()), 0); }
-};
-
-TEST(Lobby, AnswersArriveWholeWhenTheyAreTaken)
-{
-    Pair slow, quick;
-    std::string got;
-    {
-        std::vector<std::jthread> threads;
-        server::Lobby lobby({.connections = 4}, [&](server::Arrival arrival) {
-            threads.emplace_back([&lobby, socket = arrival.socket, fill = arrival.bytes.front()] {
-                lobby.leave(socket, std::string(std::size_t{8} << 20, fill), false);
-            });
-        });
-        lobby.arrive(slow.ends[0]);
-        EXPECT_EQ(::send(slow.ends[1], "a\r\n\r\n", 5, 0), 5);
-        lobby.arrive(quick.ends[0]);
-        EXPECT_EQ(::send(quick.ends[1], "b\r\n\r\n", 5, 0), 5);
-        // The slow one has taken nothing yet.
-        for (const Pair& pair : {quick, slow}) {
-            std::size_t bytes = 0;
-            std::array<char, 65536> buffer{};
-            for (ssize_t count = 0; (count = ::recv(pair.ends[1], buffer.data(), buffer.size(), 0)) > 0;) {
-                bytes += static_cast<std::size_t>(count);
-                got = buffer[0];
-            }
-            EXPECT_EQ(bytes, std::size_t{8} << 20);
-            EXPECT_EQ(got, pair.ends[0] == quick.ends[0] ? "b" : "a");
-        }
-    }
-    ::close(slow.ends[1]);
-    ::close(quick.ends[1]);
-}
-
-TEST(Lobby, AnswersThatNobodyTakesAreGivenUp)
-{
-    Pair pair;
-    const int least = 1; // the kernel takes its own minimum, a few kilobytes
-    setsockopt(pair.ends[0], SOL_SOCKET, SO_SNDBUF, &least, sizeof(least));
-    const auto begin = Clock::now();
-    {
-        std::jthread thread;
-        server::Lobby lobby({.connections = 4, .header_time = std::chrono::seconds(1)}, [&](server::Arrival arrival) {
-            thread =
-                std::jthread([&lobby, socket = arrival.socket] { lobby.leave(socket, std::string(std::size_t{8} << 20, 'x'), false); });
-        });
-        lobby.arrive(pair.ends[0]);
-        EXPECT_EQ(::send(pair.ends[1], "a\r\n\r\n", 5, 0), 5);
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        EXPECT_EQ(lobby.connections(), 1u);
-    }
-    // What the kernel took counts as moved: less than 128 KiB, 8 s worth.
-    EXPECT_GE(seconds_since(begin), 5);
-    EXPECT_LT(seconds_since(begin), 5 + 8);
-    ::close(pair.ends[1]);
 }
 
 } // namespace

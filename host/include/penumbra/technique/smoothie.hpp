@@ -14,7 +14,7 @@ struct Smoothie {
         SmoothieWidth::light; // light: a smoothie is as wide as the outer half of the penumbra that the light's size casts
     double t = 0.05;          // t_from t: the paper's t, where the light's image is 2 wide along its wider side
     SilhouetteSource silhouettes =
-        SilhouetteSource::object;          // of the objects that cast (section 3), or of the depth map (the authors' wish, section 6)
+        SilhouetteSource::object;          // of the objects that cast (the paper's section 3), or of the depth map (its section 6)
     Falloff falloff = Falloff::sinusoidal; // 3.1
     bool two_sided = false;                // beyond the paper: an inner fin too, half lit at the silhouette
     double bias = 1.0;                     // as of ShadowMap
