@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # One scene by all techniques, side by side: docs/pictures/techniques.png. Prints the error of each as a Markdown table.
 #     scripts/compare_techniques.sh        after a build; PENUMBRA names another penumbra
+# Needs oiiotool, jq, and fc-match (fontconfig) with a sans-serif font for the labels.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
