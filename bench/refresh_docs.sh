@@ -1,5 +1,6 @@
 #!/bin/sh
 # Writes the tables of docs/*.md anew. A table stands between "<!-- table: COMMAND -->" and "<!-- end -->" and is what COMMAND prints.
+# A guide's table is some rows and columns of its study's: sed and cut behind bench/table.sh.
 #     bench/refresh_docs.sh [PAGE...]      all pages without arguments
 # Run bench/run.sh first.
 set -eu
@@ -12,8 +13,10 @@ for page in "$@"; do
             command = $0
             sub(/^<!-- table: /, "", command)
             sub(/ -->$/, "", command)
-            while ((command | getline line) > 0) print line
-            if (close(command) != 0) { print "refresh_docs: failed: " command > "/dev/stderr"; exit 1 }
+            # A pipe has the status of its last command: one that printed nothing has failed too.
+            lines = 0
+            while ((command | getline line) > 0) { print line; lines++ }
+            if (close(command) != 0 || lines == 0) { print "refresh_docs: failed: " command > "/dev/stderr"; exit 1 }
             skipping = 1
             next
         }

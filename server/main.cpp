@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include <penumbra/describe.hpp>
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <type_traits>
 
 #include <penumbra/error.hpp>
 #include <penumbra/mask_job.hpp>
@@ -51,18 +52,6 @@ public:
         return static_cast<int>(most);
     }
 
-    // What goes wrong with a light of a list names its place there.
-    template <class Call> auto in_place(std::size_t index, const Call& call)
-    {
-        const MaskLight& light = job_.lights[index];
-        try {
-            return call();
-        } catch (const Error& error) {
-            if (!light.place) throw;
-            throw in_list(error, *light.place, light.own_occluders);
-        }
-    }
-
     // What is prepared for a light, and whether it was kept.
     std::pair<Prepared, bool> prepare(std::size_t index, int frame)
     {
@@ -76,6 +65,18 @@ public:
     }
 
 private:
+    // What goes wrong with a light of a list names its place there.
+    template <class Call> std::invoke_result_t<Call> in_place(std::size_t index, const Call& call)
+    {
+        const MaskLight& light = job_.lights[index];
+        try {
+            return call();
+        } catch (const Error& error) {
+            if (!light.place) throw;
+            throw in_list(error, *light.place, light.own_occluders);
+        }
+    }
+
     void before(std::string_view next) const
     {
         if (before_) before_(next);

@@ -7,18 +7,12 @@
 #include "engine/geometry.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
+#include "scene/joined.hpp"
 #include "scene/lights.hpp"
 #include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
-
-std::string joined(const std::vector<std::string_view>& names)
-{
-    std::string text;
-    for (const std::string_view name : names) text += (text.empty() ? "" : ", ") + std::string(name);
-    return text;
-}
 
 bool has_no_extent(const Light& light)
 {

@@ -5,17 +5,11 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/joined.hpp"
 #include "technique/techniques.hpp"
 
 namespace penumbra {
 namespace {
-
-std::string joined(const auto& items, auto name_of)
-{
-    std::string text;
-    for (const auto& item : items) text += (text.empty() ? "" : ", ") + std::string(name_of(item));
-    return text;
-}
 
 std::string text_of(const SettingValue& value)
 {
@@ -54,7 +48,7 @@ struct Conversion {
     }
     std::optional<SettingValue> operator()(const Choices& choices)
     {
-        expected = "one of " + joined(choices.names, [](std::string_view n) { return n; });
+        expected = "one of " + joined(choices.names);
         const auto* text = std::get_if<std::string>(&value);
         if (text)
             for (const std::string_view choice : choices.names)
@@ -68,7 +62,7 @@ const SettingKey& key_of(const TechniqueRow& row, const std::string& name)
     for (const SettingKey& key : row.keys)
         if (key.name == name) return key;
     throw Error(ErrorCode::invalid_input, "technique." + name + ": unknown key of " + std::string(row.kind),
-                "known keys: " + joined(row.keys, [](const SettingKey& k) { return k.name; }));
+                "known keys: " + joined(row.keys, &SettingKey::name));
 }
 
 template <class... S> std::vector<TechniqueRow> rows_of(std::type_identity<std::variant<S...>>) { return {row(S{})...}; }
@@ -86,7 +80,7 @@ const TechniqueRow& row_of(std::string_view kind)
     for (const TechniqueRow& row : technique_table())
         if (row.kind == kind) return row;
     throw Error(ErrorCode::invalid_input, "technique.kind: unknown technique \"" + std::string(kind) + "\"",
-                "known: " + joined(technique_table(), [](const TechniqueRow& r) { return r.kind; }));
+                "known: " + joined(technique_table(), &TechniqueRow::kind));
 }
 
 Technique technique_from(const TechniqueRequest& request)

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <penumbra/engine.hpp>
+
 #include "http/describe.hpp"
 #include "http/route.hpp"
 #include "io/scene_schema.hpp"

@@ -38,9 +38,4 @@ inline std::optional<std::uint64_t> length_from(const std::string& text)
     return value;
 }
 
-inline double seconds_since(Deadline::Clock::time_point begin)
-{
-    return std::chrono::duration<double>(Deadline::Clock::now() - begin).count();
-}
-
 } // namespace penumbra::server

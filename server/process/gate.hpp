@@ -27,6 +27,11 @@ private:
     Clock::time_point end_;
 };
 
+inline double seconds_since(Deadline::Clock::time_point begin)
+{
+    return std::chrono::duration<double>(Deadline::Clock::now() - begin).count();
+}
+
 // `slots` requests compute; `queue` more may upload or wait, first come first served. Safe to use from several threads at once.
 class Gate {
 public:

@@ -1,4 +1,4 @@
-"""Writes the scenes behind the pictures of docs/smoothie.md into the current folder; docs/smoothie.md says how the pictures are made of them."""
+"""Writes the scenes behind the pictures of docs/smoothie_study.md into the current folder; that page says how the pictures are made of them."""
 import json
 import math
 
