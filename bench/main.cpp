@@ -56,8 +56,7 @@ int main(int argc, char** argv)
     if (argc < 2) return usage();
     try {
         const penumbra::Engine engine;
-        std::printf("# penumbra %s, device %s (%s), %u compute units\n", penumbra::version().c_str(), engine.device().name.c_str(),
-                    engine.device().driver.c_str(), engine.device().compute_units);
+        print_engine(engine);
         print_header();
         for (int i = 1; i < argc; ++i) {
             bool known = false;

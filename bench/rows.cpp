@@ -39,6 +39,12 @@ Timing timing_of(std::vector<double> samples)
     return {.min = samples.front(), .median = samples[samples.size() / 2], .max = samples.back()};
 }
 
+void print_engine(const Engine& engine)
+{
+    std::printf("# penumbra %s, device %s (%s), %u compute units\n", version().c_str(), engine.device().name.c_str(),
+                engine.device().driver.c_str(), engine.device().compute_units);
+}
+
 void print_header()
 {
     std::puts("bench,scene,technique,settings,parameter,mae_shadow,rmse_shadow,bias_shadow,max,p99_shadow,prepare_ms,shade_ms_min,shade_ms_"

@@ -25,6 +25,9 @@ struct Row {
     double device_bytes = 0;
 };
 
+// Prints what is measured, as a comment: version, device, driver.
+void print_engine(const Engine& engine);
+
 // Prints the column names, then rows as they come (CSV).
 void print_header();
 void print(const Row& row);

@@ -89,8 +89,7 @@ void print_rate(const Engine& engine, const Scene& scene, const char* name, int 
 void run(const Folder& folder, double seconds)
 {
     const Engine engine;
-    std::printf("# penumbra %s, device %s (%s), %u compute units\n", version().c_str(), engine.device().name.c_str(),
-                engine.device().driver.c_str(), engine.device().compute_units);
+    print_engine(engine);
     const Scene made = measured_scene(128), heavy = measured_scene(512);
     for (const char* kind : {"exr", "pfm"}) write_request(folder, made, kind, kind);
     write_request(folder, heavy, "heavy", "exr");
