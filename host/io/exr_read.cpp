@@ -7,17 +7,15 @@
 #include <cstring>
 #include <limits>
 
-#include <libdeflate.h>
 #include <openexr.h>
 
+#include "io/exr_zip.hpp"
+#include "io/image_format.hpp"
 #include "scene/parallel.hpp"
 
 namespace penumbra {
 
 namespace {
-
-// No deflate stream becomes more than this many times longer (zlib's documentation).
-constexpr std::size_t most_inflated = 1032;
 
 // Below this a second thread takes longer to start than it helps (some 0.05 ms).
 constexpr std::size_t bytes_worth_a_thread = 128 << 10;
@@ -80,38 +78,22 @@ public:
     }
 
 private:
-    // OpenEXRCore 3.1 inflates with zlib, which takes twice as long. ZIP: bytes at even places, then those at odd places; each replaced by
-    // its difference to the one before (plus 128); deflated. A chunk that would not become smaller is stored as it is.
     static exr_result_t inflate(exr_decode_pipeline_t* chunk)
     {
-        Unpacker& self = *static_cast<Unpacker*>(chunk->decoding_user_data);
-        const std::size_t bytes = chunk->chunk.unpacked_size;
-        if (chunk->chunk.packed_size == bytes) return EXR_ERR_SUCCESS;
-        self.inflated_.resize(bytes);
-        if (!self.decompressor_ || libdeflate_zlib_decompress(self.decompressor_.get(), chunk->packed_buffer, chunk->chunk.packed_size,
-                                                              self.inflated_.data(), bytes, nullptr) != LIBDEFLATE_SUCCESS)
-            return EXR_ERR_CORRUPT_CHUNK;
-        unsigned sum = 128;
-        for (unsigned char& byte : self.inflated_) byte = static_cast<unsigned char>(sum += byte ^ 128u); // - 128, in bytes
-        auto* out = static_cast<unsigned char*>(chunk->unpacked_buffer);
-        const unsigned char *even = self.inflated_.data(), *odd = even + (bytes + 1) / 2;
-        for (std::size_t i = 0; i < bytes / 2; ++i) {
-            out[2 * i] = even[i];
-            out[2 * i + 1] = odd[i];
-        }
-        return EXR_ERR_SUCCESS;
+        const std::size_t packed = chunk->chunk.packed_size, bytes = chunk->chunk.unpacked_size;
+        if (packed == bytes) return EXR_ERR_SUCCESS; // stored as it is
+        const bool sound = static_cast<Unpacker*>(chunk->decoding_user_data)
+                               ->inflater_.inflate({static_cast<const unsigned char*>(chunk->packed_buffer), packed},
+                                                   {static_cast<unsigned char*>(chunk->unpacked_buffer), bytes});
+        return sound ? EXR_ERR_SUCCESS : EXR_ERR_CORRUPT_CHUNK;
     }
 
-    struct Free {
-        void operator()(libdeflate_decompressor* decompressor) const { libdeflate_free_decompressor(decompressor); }
-    };
     exr_const_context_t context_;
     std::span<const std::size_t> picked_;
     const PlainExr& exr_;
     float* samples_;
     exr_decode_pipeline_t chunk_ = EXR_DECODE_PIPELINE_INITIALIZER;
-    std::unique_ptr<libdeflate_decompressor, Free> decompressor_{libdeflate_alloc_decompressor()};
-    std::vector<unsigned char> inflated_;
+    ExrInflater inflater_;
 };
 
 // What the header says, if it is of the kind that is read here.

@@ -8,6 +8,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "io/exr_zip.hpp"
+
 namespace penumbra {
 
 namespace {
@@ -35,7 +37,6 @@ struct Writer {
         settings.error_handler_fn = [](exr_const_context_t, exr_result_t, const char*) {}; // by default it prints
         settings.user_data = &file;
         settings.write_fn = append;
-        settings.zip_level = 1;
         check(exr_start_write(&context, "mask.exr", EXR_WRITE_FILE_DIRECTLY, &settings));
     }
     Writer(const Writer&) = delete;
@@ -48,7 +49,22 @@ struct Writer {
 
     exr_context_t context = nullptr;
     exr_encode_pipeline_t chunk = EXR_ENCODE_PIPELINE_INITIALIZER;
+    ExrDeflater deflater;
+    std::vector<unsigned char> packed;
 };
+
+exr_result_t deflate(exr_encode_pipeline_t* chunk)
+{
+    // As OpenEXRCore stores bytes as they are: what is to be written is what was packed. Its buffer for the other case is ours.
+    const std::size_t size = chunk->packed_bytes;
+    auto& writer = *static_cast<Writer*>(chunk->encoding_user_data);
+    writer.packed.resize(size);
+    const std::size_t packed = writer.deflater.deflate({static_cast<const unsigned char*>(chunk->packed_buffer), size}, writer.packed);
+    chunk->compressed_buffer = packed > 0 ? writer.packed.data() : chunk->packed_buffer;
+    chunk->compressed_bytes = packed > 0 ? packed : size;
+    chunk->compressed_alloc_size = 0;
+    return EXR_ERR_SUCCESS;
+}
 
 void write_header(exr_context_t context, const Image& image, int bits, std::span<const char* const> names)
 {
@@ -79,7 +95,11 @@ void write_chunk(Writer& writer, const Image& image, std::span<const char* const
         const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) * names.size();
         channel.encode_from_ptr = reinterpret_cast<const std::uint8_t*>(&image.pixels[at + static_cast<std::size_t>(c - names.begin())]);
     }
-    if (first) check(exr_encoding_choose_default_routines(writer.context, 0, &writer.chunk));
+    if (first) {
+        check(exr_encoding_choose_default_routines(writer.context, 0, &writer.chunk));
+        writer.chunk.encoding_user_data = &writer;
+        writer.chunk.compress_fn = deflate;
+    }
     check(exr_encoding_run(writer.context, 0, &writer.chunk));
 }
 

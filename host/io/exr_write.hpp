@@ -9,8 +9,8 @@
 
 namespace penumbra {
 
-// 1 to 4 channels with these names, 16 or 32 bits, ZIP at zlib's fastest level (docs/bench.md has times and sizes). Always the same bytes
-// for the same pixels.
+// 1 to 4 channels with these names, 16 or 32 bits, ZIP at libdeflate's fastest level (docs/bench.md has times and sizes). Always the same
+// bytes for the same pixels.
 std::vector<std::byte> encode_exr(const Image& image, int bits, std::span<const char* const> names);
 
 } // namespace penumbra

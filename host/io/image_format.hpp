@@ -10,6 +10,9 @@
 
 namespace penumbra {
 
+// No deflate stream becomes more than this many times longer (zlib's documentation).
+constexpr std::size_t most_inflated = 1032;
+
 enum class ImageFormat { unknown, exr, tiff, png, pfm, hdr };
 
 // By the first bytes.

@@ -6,14 +6,12 @@
 
 #include <penumbra/error.hpp>
 
+#include "io/image_format.hpp"
 #include "io/png.hpp"
 
 namespace penumbra {
 
 namespace {
-
-// No deflate stream becomes more than this many times longer (zlib's documentation).
-constexpr std::uint64_t most_inflated = 1032;
 
 struct Free {
     void operator()(spng_ctx* context) const { spng_ctx_free(context); }
@@ -33,7 +31,9 @@ public:
     {
         // Palettes become colours, a transparent colour becomes alpha, and fewer bits than 8 become 8.
         spng_trns ignored;
-        const bool clear = spng_get_trns(context_.get(), &ignored) == 0;
+        const int transparency = spng_get_trns(context_.get(), &ignored);
+        const bool clear = transparency != SPNG_ECHUNKAVAIL;
+        if (clear) check(transparency);
         const bool colour = header_.color_type & SPNG_COLOR_TYPE_TRUECOLOR, alpha = clear || header_.color_type & 4;
         const int channels = (colour ? 3 : 1) + (alpha ? 1 : 0);
         check_size(channels, max_samples);
@@ -66,6 +66,15 @@ private:
                                                       " bytes cannot hold " + size + " pixels");
     }
 
+    // What follows the pixels. Of the last chunk libspng reads no more than its name.
+    void check_end() const
+    {
+        using namespace std::string_view_literals;
+        check(spng_decode_chunks(context_.get()));
+        const std::string_view text(reinterpret_cast<const char*>(png_.data()), png_.size());
+        if (text.rfind("\0\0\0\0IEND\xae\x42\x60\x82"sv) == std::string_view::npos) check(SPNG_EOF);
+    }
+
     template <class Sample> void decode(PngImage& image, int format)
     {
         std::size_t bytes = 0;
@@ -73,7 +82,7 @@ private:
         const std::size_t count = bytes / sizeof(Sample);
         const auto samples = std::make_unique_for_overwrite<Sample[]>(count);
         check(spng_decode_image(context_.get(), samples.get(), bytes, format, SPNG_DECODE_TRNS));
-        check(spng_decode_chunks(context_.get())); // what follows the pixels, up to the end
+        check_end();
         image.samples.assign(samples.get(), samples.get() + count);
     }
 

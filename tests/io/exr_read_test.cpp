@@ -1,5 +1,6 @@
-// Our own reading of plain EXR files beside OpenImageIO's: the same samples, bit for bit, or nothing.
+// Plain EXR files by OpenEXRCore beside OpenImageIO: the same samples, bit for bit, or nothing.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <random>
@@ -8,7 +9,8 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include "io/exr_scanlines.hpp"
+#include "io/exr_header.hpp"
+#include "io/exr_read.hpp"
 #include "io/support.hpp"
 
 using namespace penumbra;
@@ -98,12 +100,23 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b)
 // Every channel of the file by both; fails where ours reads nothing.
 void expect_same(std::span<const std::byte> exr)
 {
-    const ExrHeader header = check_exr_header(exr, "x", no_limit);
-    ASSERT_TRUE(has_plain_scanlines(header));
-    for (std::size_t c = 0; c < header.channels.size(); ++c) {
-        const auto samples = read_exr_channel(exr, header, c);
-        ASSERT_TRUE(samples.has_value()) << header.channels[c].name;
-        EXPECT_TRUE(same_bits(*samples, oracle(exr, header.channels[c].name))) << header.channels[c].name;
+    check_exr_header(exr, "x", no_limit);
+    const auto file = PlainExr::open(exr);
+    ASSERT_TRUE(file.has_value());
+    std::vector<std::size_t> all;
+    for (std::size_t c = 0; c < file->channels().size(); ++c) {
+        const auto samples = file->read(std::array{c});
+        ASSERT_TRUE(samples.has_value()) << file->channels()[c].name;
+        EXPECT_TRUE(same_bits(*samples, oracle(exr, file->channels()[c].name))) << file->channels()[c].name;
+        all.push_back(c);
+    }
+    // Together, interleaved.
+    const auto together = file->read(all);
+    ASSERT_TRUE(together.has_value());
+    for (const std::size_t c : all) {
+        std::vector<float> one;
+        for (std::size_t i = c; i < together->size(); i += all.size()) one.push_back((*together)[i]);
+        EXPECT_TRUE(same_bits(one, oracle(exr, file->channels()[c].name))) << file->channels()[c].name;
     }
 }
 
@@ -112,7 +125,7 @@ const std::vector<std::pair<std::string, OIIO::TypeDesc>> mixed{{"R", OIIO::Type
 
 } // namespace
 
-TEST(ExrScanlines, ReadWhatOpenImageIOReads)
+TEST(ExrRead, ReadWhatOpenImageIOReads)
 {
     for (const char* compression : {"none", "zips", "zip"})
         for (const auto& size : {std::pair{1, 1}, {1, 61}, {61, 1}, {7, 93}, {64, 17}, {253, 331}})
@@ -125,9 +138,9 @@ TEST(ExrScanlines, ReadWhatOpenImageIOReads)
                 }
 }
 
-TEST(ExrScanlines, OtherKindsAreLeftToOpenImageIO)
+TEST(ExrRead, OtherKindsAreLeftToOpenImageIO)
 {
-    const auto plain = [](const Recipe& recipe) { return has_plain_scanlines(check_exr_header(make(recipe, true), "x", no_limit)); };
+    const auto plain = [](const Recipe& recipe) { return PlainExr::open(make(recipe, true)).has_value(); };
     EXPECT_TRUE(plain({}));
     for (const char* compression : {"rle", "piz", "pxr24", "b44", "b44a"}) EXPECT_FALSE(plain({.compression = compression})) << compression;
     EXPECT_FALSE(plain({.adjust = [](OIIO::ImageSpec& spec) { spec.tile_width = spec.tile_height = 16; }})) << "tiles";
@@ -140,7 +153,7 @@ TEST(ExrScanlines, OtherKindsAreLeftToOpenImageIO)
     }
 }
 
-TEST(ExrScanlines, WindowsAndRowOrdersDoNotMatter)
+TEST(ExrRead, WindowsAndRowOrdersDoNotMatter)
 {
     const auto moved = [](OIIO::ImageSpec& spec) { spec.x = spec.full_x = -1000, spec.y = spec.full_y = 12345; };
     const auto upward = [](OIIO::ImageSpec& spec) { spec.attribute("openexr:lineOrder", "decreasingY"); };
@@ -150,7 +163,7 @@ TEST(ExrScanlines, WindowsAndRowOrdersDoNotMatter)
     }
 }
 
-TEST(ExrScanlines, ChannelsAreTheSameOnes)
+TEST(ExrRead, ChannelsAreTheSameOnes)
 {
     // decode_raw_depth takes ours where the names are plain, else OpenImageIO's; a tiled copy always goes to OpenImageIO.
     using Names = std::vector<std::string>;
@@ -188,7 +201,7 @@ TEST(ExrScanlines, ChannelsAreTheSameOnes)
         }
 }
 
-TEST(ExrScanlines, LimitsHoldAsForEveryOtherFile)
+TEST(ExrRead, LimitsHoldAsForEveryOtherFile)
 {
     const std::vector<std::byte> exr = make({.channels = mixed}, true);
     const std::uint64_t samples = 7 * 93 * 6;
@@ -196,7 +209,7 @@ TEST(ExrScanlines, LimitsHoldAsForEveryOtherFile)
     EXPECT_EQ(error_of([&] { decode_raw_depth(exr, "Z", "x", samples - 1); }).code(), ErrorCode::too_large);
 }
 
-TEST(ExrScanlines, BrokenFilesAreReadByNobodyOrAlike)
+TEST(ExrRead, BrokenFilesAreReadByNobodyOrAlike)
 {
     std::mt19937 random(20065);
     for (const char* compression : {"none", "zips", "zip"}) {
@@ -208,13 +221,11 @@ TEST(ExrScanlines, BrokenFilesAreReadByNobodyOrAlike)
                 exr[random() % (random() % 2 ? 900 : exr.size())] = static_cast<std::byte>(random());
             if (random() % 8 == 0) exr.resize(random() % exr.size());
             try {
-                const ExrHeader header = check_exr_header(exr, "x", 1 << 14);
-                if (!has_plain_scanlines(header) ||
-                    static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height) > 1 << 14)
-                    continue;
-                for (std::size_t c = 0; c < header.channels.size(); ++c)
-                    if (const auto samples = read_exr_channel(exr, header, c)) {
-                        const std::vector<float> theirs = oracle(exr, header.channels[c].name);
+                check_exr_header(exr, "x", 1 << 14);
+                const auto file = PlainExr::open(exr);
+                for (std::size_t c = 0; file && c < file->channels().size(); ++c)
+                    if (const auto samples = file->read(std::array{c})) {
+                        const std::vector<float> theirs = oracle(exr, file->channels()[c].name);
                         EXPECT_TRUE(theirs.empty() || same_bits(*samples, theirs)) << compression << ", round " << round;
                     }
             } catch (const Error&) {
@@ -223,12 +234,27 @@ TEST(ExrScanlines, BrokenFilesAreReadByNobodyOrAlike)
     }
 }
 
-TEST(ExrScanlines, EveryTruncationIsAnError)
+TEST(ExrRead, EveryTruncationIsAnError)
 {
     for (const char* compression : {"none", "zips", "zip"}) {
         const std::vector<std::byte> whole = make({.compression = compression}, true);
-        const ExrHeader header = check_exr_header(whole, "x", no_limit);
-        for (std::size_t size = header.end; size < whole.size(); ++size)
-            ASSERT_FALSE(read_exr_channel(std::span(whole).first(size), header, 0)) << compression << " cut to " << size;
+        for (std::size_t size = 0; size < whole.size(); ++size) {
+            const auto file = PlainExr::open(std::span(whole).first(size));
+            ASSERT_FALSE(file && file->read(std::array{std::size_t{0}})) << compression << " cut to " << size;
+        }
+    }
+}
+
+TEST(ExrRead, ColoursComeInTheOrderOfPixels)
+{
+    const auto four = [](const char* a, const char* b, const char* c, const char* d) {
+        return Recipe{.channels = {{a, OIIO::TypeHalf}, {b, OIIO::TypeHalf}, {c, OIIO::TypeHalf}, {d, OIIO::TypeFloat}}};
+    };
+    Recipe three = four("R", "G", "B", "A");
+    three.channels.pop_back();
+    for (Recipe recipe : {three, four("R", "G", "B", "A"), four("R", "G", "B", "Z")}) {
+        const Image ours = decode_image(make(recipe, true), "x");
+        recipe.adjust = [](OIIO::ImageSpec& spec) { spec.tile_width = spec.tile_height = 16; };
+        EXPECT_TRUE(same_bits(ours.pixels, decode_image(make(recipe, true), "x").pixels)) << "tiles are left to OpenImageIO";
     }
 }
