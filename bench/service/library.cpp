@@ -13,7 +13,7 @@
 #include <penumbra/penumbra.hpp>
 
 #include "io/image_io.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 #include "rows.hpp"
 #include "scenes.hpp"
 

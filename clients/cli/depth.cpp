@@ -8,7 +8,7 @@
 #include <penumbra/scene.hpp>
 
 #include "files.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 #include "mask_files.hpp"
 #include "progress.hpp"
 #include "streams.hpp"

@@ -86,4 +86,17 @@ OutputFormat by_extension(OutputFormat output, const std::string& path)
     return output;
 }
 
+std::string_view image_format_of(std::span<const std::byte> bytes)
+{
+    switch (sniff(bytes)) {
+    case ImageFormat::exr: return "exr";
+    case ImageFormat::tiff: return "tif";
+    case ImageFormat::png: return "png";
+    case ImageFormat::pfm: return "pfm";
+    case ImageFormat::hdr: return "hdr";
+    case ImageFormat::unknown: break;
+    }
+    return {};
+}
+
 } // namespace penumbra

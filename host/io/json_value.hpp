@@ -12,15 +12,13 @@
 
 #include <penumbra/error.hpp>
 #include <penumbra/scene.hpp>
+#include <penumbra/scene_file.hpp>
 
 namespace penumbra {
 
 // Throws invalid_input, with line and column where the text is not JSON, for keys that stand twice in one object, and for nesting deeper
 // than 32.
 nlohmann::json parse_json(std::string_view text);
-
-// `text` in double quotes, on one line, cut when long.
-std::string in_quotes(std::string_view text);
 
 // A value and the key that leads to it ("occluders.depth.layers[2]"). Refers to the document; every accessor throws invalid_input naming
 // the key.

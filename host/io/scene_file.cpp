@@ -1,4 +1,4 @@
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 
 #include <algorithm>
 #include <filesystem>

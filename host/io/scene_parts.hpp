@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "io/json_value.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 #include "scene/depth.hpp"
 
 namespace penumbra {

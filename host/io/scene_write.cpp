@@ -3,7 +3,7 @@
 
 #include <penumbra/error.hpp>
 
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 
 namespace penumbra {
 

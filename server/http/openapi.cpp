@@ -5,12 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include <penumbra/engine.hpp>
+#include <penumbra/scene_file.hpp>
 
 #include "http/describe.hpp"
 #include "http/route.hpp"
-#include "io/scene_schema.hpp"
 #include "masks/mask_format.hpp"
-#include "masks/scene_patch.hpp"
 #include "process/problem.hpp"
 
 namespace penumbra::server {
@@ -138,14 +137,14 @@ Json patch_schema()
                    {"description", "a JSON Merge Patch (RFC 7396) of a scene: members replace those of the same name, null takes one away"},
                    {"properties", Json::object()},
                    {"additionalProperties", false}};
-    for (const std::string_view section : patched_sections)
+    for (const std::string_view section : patched_sections())
         schema["properties"][std::string(section)] = {{"type", {section == "lights" ? "array" : "object", "null"}}};
     return schema;
 }
 
 Json schemas()
 {
-    Json all = scene_definitions("#/components/schemas/");
+    Json all = Json::parse(scene_definitions_json("#/components/schemas/"));
     const Json whole = {{"type", "integer"}};
     const Json texts = {{"type", "array"}, {"items", text_schema}};
     all.update({{"Problem",

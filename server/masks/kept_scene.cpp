@@ -6,12 +6,8 @@
 
 #include <penumbra/error.hpp>
 
-#include "io/json_value.hpp"
-#include "io/scene_check.hpp"
-#include "io/scene_parts.hpp"
 #include "masks/digest.hpp"
 #include "masks/resources.hpp"
-#include "masks/scene_patch.hpp"
 #include "process/problem.hpp"
 
 namespace penumbra::server {
@@ -62,19 +58,17 @@ std::string id_of(std::span<const Part> parts)
 
 // A patched document beside the one that was decoded.
 struct KeptScene::Changes {
-    const nlohmann::json& before;
-    const nlohmann::json& after;
+    const SceneDocument& before;
+    const SceneDocument& after;
     std::vector<std::string_view> names; // of the extra parts
 
     // Whether a section is as it was, its images as well.
     bool same(const char* section) const
     {
-        const auto a = before.find(section), b = after.find(section);
-        if ((a == before.end()) != (b == after.end())) return false;
-        return a == before.end() || (*a == *b && !names_file(*b, section, names));
+        return before.has(section) == after.has(section) && before.text(section) == after.text(section) &&
+            !after.names_file(section, names);
     }
     bool same_lights() const { return same("light") && same("lights"); }
-    std::string text(const char* section) const { return after.contains(section) ? after[section].dump() : std::string(); }
 };
 
 KeptScene::Decoded KeptScene::decoded(std::span<const Part> parts, const Options& options, const Deadline& deadline)
@@ -88,7 +82,7 @@ KeptScene::Decoded KeptScene::decoded(std::span<const Part> parts, const Options
 
 KeptScene::KeptScene(std::string id, std::span<const Part> parts, const Options& options, const Deadline& deadline)
     : id_(std::move(id)), owned_(copied(parts)), parts_(views(owned_)), scene_(decoded(parts_, options, deadline)),
-      document_(parse_json(find_scene(parts_, options)->bytes)), cache_(scene_.job.lights.size())
+      document_(find_scene(parts_, options)->bytes), cache_(scene_.job.lights.size())
 {
 }
 
@@ -114,27 +108,24 @@ std::string KeptScene::content_of(std::string_view patch, std::span<const Part> 
 void KeptScene::check_objects(const Changes& changes) const
 {
     if (scene_.job.geometry.objects().empty()) return;
-    const auto objects = changes.after.find("objects");
-    if (objects == changes.after.end()) return;
-    if (names_file(*objects, "objects", changes.names))
+    if (changes.after.names_file("objects", changes.names))
         throw Error::at(ErrorCode::invalid_input, "objects", "name a part that came with this request, and objects are kept as they are",
                         "give the part another name, or upload the scene anew");
-    if (!changes.same_lights() && objects_follow_light(changes.after))
+    if (!changes.same_lights() && changes.after.objects_follow_light())
         throw Error::at(ErrorCode::invalid_input, "light", "cannot be changed: the depth of an object is seen from the light itself",
                         "give that object a camera of kind pinhole, or upload the scene anew");
 }
 
-std::vector<MaskLight> KeptScene::patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
+std::vector<MaskLight> KeptScene::patched_lights(const Changes& changes, const Resources& resources,
                                                  std::vector<std::string>& warnings) const
 {
-    Scene scene;
-    parse_lights(root, resources, scene);
-    const bool listed = !scene.lights.empty() || document_.contains("lights");
+    Scene scene = changes.after.lights(resources);
+    const bool listed = !scene.lights.empty() || document_.has("lights");
     const MaskLight& before = scene_.job.lights.front();
     // A light's camera reads differently for a directional light.
     const bool same_cameras = is_directional(scene.light) == is_directional(before.light);
-    const bool same_occluders = !listed && changes.same("occluders") && (same_cameras || !root.has("occluders"));
-    if (!same_occluders) parse_all_occluders(root, resources, scene);
+    const bool same_occluders = !listed && changes.same("occluders") && (same_cameras || !changes.after.has("occluders"));
+    if (!same_occluders) changes.after.add_occluders(scene, resources);
     warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
     std::vector<MaskLight> lights = lights_of(std::move(scene));
     if (same_occluders) lights.front().occluders = before.occluders;
@@ -147,9 +138,9 @@ void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lig
 {
     for (const std::size_t i : chosen_from(lights, choice)) {
         const MaskLight& light = lights[i];
-        const nlohmann::json& json = light.place ? changes.after["lights"][*light.place] : changes.after["light"];
         MaskTask::LightKeys keys;
-        if (same_occluders && !names_file(json, light.place ? "lights[]" : "light", changes.names)) keys.frame = json.dump() + '\n' + changes.text("technique");
+        if (same_occluders && !changes.after.light_names_file(light.place, changes.names))
+            keys.frame = changes.after.light_text(light.place) + '\n' + changes.after.text("technique");
         if (frames_of(light.light) > 0 && !keys.frame.empty()) {
             keys.still = keys.frame;
             keys.frame += "\nframe " + std::to_string(choice.frame);
@@ -163,7 +154,7 @@ void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lig
 MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
                          const Deadline& deadline) const
 {
-    const nlohmann::json after = patch.empty() ? document_ : patched(document_, parse_json(patch));
+    const SceneDocument after = document_.patched(patch);
     Changes changes{document_, after, {}};
     for (const Part& part : extra)
         if (part.name != "scene") changes.names.push_back(part.name);
@@ -181,28 +172,25 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
                   .output = scene_.output,
                   .cache = &cache_,
                   .light_keys = {},
-                  .receivers_key = changes.text("receivers")};
-    const JsonObject root(JsonValue(after, {}));
-    if (!changes.same("output")) task.output = root.has("output") ? parse_output(root.need("output")) : OutputFormat{};
-    if (!changes.same("technique"))
-        task.job.technique = technique_from(root.has("technique") ? parse_technique(root.need("technique")) : TechniqueRequest{});
+                  .receivers_key = after.text("receivers")};
+    if (!changes.same("output")) task.output = after.output();
+    if (!changes.same("technique")) task.job.technique = technique_from(after.technique());
 
     const bool same_lights = changes.same_lights() && changes.same("occluders");
     std::vector<MaskLight> patched;
-    if (!same_lights) patched = patched_lights(changes, root, resources, task.job.warnings);
+    if (!same_lights) patched = patched_lights(changes, resources, task.job.warnings);
     const std::vector<MaskLight>& lights = same_lights ? scene_.job.lights : patched;
     const Light& first = lights.front().light;
     const bool same_cameras = is_directional(first) == is_directional(scene_.job.lights.front().light);
-    check_shared_views(root);
-    if (!changes.same("receivers") || (!same_cameras && root.has("receivers")))
-        task.job.receivers = std::make_shared<const Receivers>(
-            root.has("receivers") ? parse_receivers(root.need("receivers"), first, resources, task.job.warnings) : Receivers{});
+    after.check_shared_views();
+    if (!changes.same("receivers") || (!same_cameras && after.has("receivers")))
+        task.job.receivers = std::make_shared<const Receivers>(after.receivers(first, resources, task.job.warnings));
 
-    choose(changes, lights, changes.same("occluders") && (same_cameras || !root.has("occluders")), choice, task);
-    if (!changes.same("receivers") && names_file(after.value("receivers", nlohmann::json()), "receivers", changes.names)) task.receivers_key.clear();
+    choose(changes, lights, changes.same("occluders") && (same_cameras || !after.has("occluders")), choice, task);
+    if (!changes.same("receivers") && after.names_file("receivers", changes.names)) task.receivers_key.clear();
     // Seen from the light, or fitted by it, the receivers depend on it.
     if (!task.receivers_key.empty() && std::holds_alternative<LightCamera>(task.job.receivers->camera))
-        task.receivers_key += '\n' + changes.text("light") + changes.text("lights");
+        task.receivers_key += '\n' + after.text("light") + after.text("lights");
     return task;
 }
 

@@ -8,12 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include <penumbra/engine.hpp>
+#include <penumbra/scene_file.hpp>
 
-#include "io/json_value.hpp"
-#include "io/scene_file.hpp"
 #include "masks/mask_cache.hpp"
 #include "masks/masks.hpp"
 #include "masks/part.hpp"
@@ -40,7 +37,7 @@ public:
     // Names what a task of that patch and those parts depends on.
     std::string content_of(std::string_view patch, std::span<const Part> extra) const;
 
-    // What to compute a mask from: the scene with `patch` (scene_patch.hpp), an empty one to take it as it stands. The images that the
+    // What to compute a mask from: the scene with `patch` (SceneDocument::patched), an empty one to take it as it stands. The images that the
     // patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.
     MaskTask task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
                   const Deadline& deadline) const;
@@ -59,7 +56,7 @@ private:
     // What decides whether a kept piece still holds.
     struct Changes;
     void check_objects(const Changes& changes) const;
-    std::vector<MaskLight> patched_lights(const Changes& changes, const JsonObject& root, const Resources& resources,
+    std::vector<MaskLight> patched_lights(const Changes& changes, const Resources& resources,
                                           std::vector<std::string>& warnings) const;
     static void choose(const Changes& changes, const std::vector<MaskLight>& lights, bool same_occluders, const MaskChoice& choice,
                        MaskTask& task);
@@ -68,7 +65,7 @@ private:
     std::vector<std::pair<std::string, std::string>> owned_; // names and bytes of the parts
     std::vector<Part> parts_;                                // views of owned_
     Decoded scene_;
-    nlohmann::json document_;
+    SceneDocument document_;
     mutable MaskCache cache_;
 };
 

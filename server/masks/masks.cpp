@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include <penumbra/error.hpp>
+#include <penumbra/scene_file.hpp>
 
-#include "io/scene_file.hpp"
 #include "masks/digest.hpp"
 #include "masks/resources.hpp"
 #include "masks/work_limits.hpp"
@@ -86,7 +86,7 @@ Scene decode_scene(std::span<const Part> parts, const Options& options, const De
     const Part* const part = find_scene(parts, options);
     if (!part) throw Problem(400, "no_scene_part", "the request has no part named scene; expected the scene's JSON");
     const RequestResources resources(parts, options, deadline);
-    return resources.without_paths([&] { return parse_scene(part->bytes, resources); });
+    return parse_scene(part->bytes, resources);
 }
 
 std::vector<std::size_t> chosen_from(const std::vector<MaskLight>& lights, const MaskChoice& choice)

@@ -9,8 +9,6 @@
 
 #include <penumbra/error.hpp>
 
-#include "io/image_format.hpp"
-#include "io/json_value.hpp"
 
 namespace penumbra::server {
 
@@ -41,8 +39,8 @@ Bytes RequestResources::bytes(const std::string& name) const
 {
     const std::string_view text = use(name);
     const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
-    const ImageFormat format = sniff(bytes);
-    if (format == ImageFormat::unknown || format == ImageFormat::hdr)
+    const std::string_view format = image_format_of(bytes);
+    if (format.empty() || format == "hdr")
         throw Error(ErrorCode::unsupported, "part " + in_quotes(name) + " is of no format that is taken", "expected EXR, PNG, TIFF or PFM");
     return Bytes(bytes);
 }

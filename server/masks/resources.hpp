@@ -6,8 +6,8 @@
 #include <string>
 
 #include <penumbra/error.hpp>
+#include <penumbra/scene_file.hpp>
 
-#include "io/scene_file.hpp"
 #include "masks/part.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
@@ -29,9 +29,6 @@ public:
     // A mesh, in a private temporary file that goes with this object. Throws unsupported without options.allow_meshes.
     std::string path(const std::string& name) const override;
     std::uint64_t max_samples() const override { return static_cast<std::uint64_t>(options_.image_samples); }
-
-    // The scene file's reader tells files by their names in the scene: there are no paths to take out.
-    template <class Call> auto without_paths(Call&& call) const { return call(); }
 
 private:
     std::string_view use(const std::string& name) const;

@@ -1,7 +1,7 @@
 // A scene's JSON, with small sound images behind the names in samples.hpp.
 #include "fuzz/samples.hpp"
 #include "fuzz/target.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 
 using namespace penumbra;
 using fuzz::expect;

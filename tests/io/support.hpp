@@ -18,7 +18,7 @@
 #include <penumbra/error.hpp>
 
 #include "io/image_io.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 
 namespace penumbra::test {
 

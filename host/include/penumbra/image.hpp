@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <penumbra/export.hpp>
@@ -38,6 +39,9 @@ struct OutputFormat {
     std::string format; // "exr", "tif", "png", "pfm", "hdr"; empty: by the file name's extension
     int bits = 0;       // 8 or 16 (png, tif: integers), 16 or 32 (exr, tif: floats); 0: png 16, tif 32, exr 32, pfm 32, hdr 32
 };
+
+// What an image file is by its first bytes: "exr", "tif", "png", "pfm", "hdr"; empty: none of them.
+PENUMBRA_API std::string_view image_format_of(std::span<const std::byte> bytes);
 
 // Reads EXR, TIFF, PNG, PFM or HDR, decided by the file's first bytes. Integer samples come as 0 to 1, linear as they stand.
 // Throws not_found, invalid_input (truncated, no such format, deep, more than 4 channels), too_large.

@@ -6,7 +6,7 @@
 #include <sys/resource.h>
 
 #include "http/metrics.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 #include "server/client.hpp"
 #include "server/program.hpp"
 

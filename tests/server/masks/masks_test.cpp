@@ -3,7 +3,7 @@
 #include <span>
 
 #include "io/image_io.hpp"
-#include "io/scene_file.hpp"
+#include <penumbra/scene_file.hpp>
 #include "masks/masks.hpp"
 #include "server/client.hpp"
 

@@ -6,7 +6,6 @@
 
 #include "io/image_io.hpp"
 #include "masks/digest.hpp"
-#include "masks/scene_patch.hpp"
 #include "masks/scene_store.hpp"
 #include "process/problem.hpp"
 #include "server/client.hpp"
@@ -288,14 +287,16 @@ TEST(SceneStore, ForgetsAfterAWhileWithoutUse)
 
 TEST(ScenePatch, MergesAsTheRfcSaysButForAnotherKind)
 {
-    const Json scene = {{"light", {{"kind", "point"}, {"center", {0, 1, 0}}}}, {"technique", {{"kind", "a"}, {"x", 1}}}};
-    EXPECT_EQ(server::patched(scene, Json::object()), scene);
-    EXPECT_EQ(server::patched(scene, {{"light", {{"center", {1, 1, 1}}}}})["light"], (Json{{"kind", "point"}, {"center", {1, 1, 1}}}));
-    EXPECT_EQ(server::patched(scene, {{"technique", {{"kind", "b"}, {"y", 2}}}})["technique"], (Json{{"kind", "b"}, {"y", 2}}));
-    EXPECT_EQ(server::patched(scene, {{"technique", {{"kind", "a"}, {"y", 2}}}})["technique"], (Json{{"kind", "a"}, {"x", 1}, {"y", 2}}));
-    EXPECT_EQ(server::patched(scene, {{"technique", nullptr}}).count("technique"), 0u);
-    EXPECT_EQ(server::patched(scene, {{"technique", {{"x", nullptr}}}})["technique"], (Json{{"kind", "a"}}));
-    EXPECT_THROW(server::patched(scene, {{"penumbra", 2}}), Error);
+    const SceneDocument scene(R"({"light": {"kind": "point", "center": [0, 1, 0]}, "technique": {"kind": "a", "x": 1}})");
+    const auto patched = [&](const char* patch, const char* section) { return scene.patched(patch).text(section); };
+    EXPECT_EQ(scene.patched("{}").text(), scene.text());
+    EXPECT_EQ(scene.patched("").text(), scene.text());
+    EXPECT_EQ(Json::parse(patched(R"({"light": {"center": [1, 1, 1]}})", "light")), (Json{{"kind", "point"}, {"center", {1, 1, 1}}}));
+    EXPECT_EQ(Json::parse(patched(R"({"technique": {"kind": "b", "y": 2}})", "technique")), (Json{{"kind", "b"}, {"y", 2}}));
+    EXPECT_EQ(Json::parse(patched(R"({"technique": {"kind": "a", "y": 2}})", "technique")), (Json{{"kind", "a"}, {"x", 1}, {"y", 2}}));
+    EXPECT_FALSE(scene.patched(R"({"technique": null})").has("technique"));
+    EXPECT_EQ(Json::parse(patched(R"({"technique": {"x": null}})", "technique")), (Json{{"kind", "a"}}));
+    EXPECT_THROW(scene.patched(R"({"penumbra": 2})"), Error);
 }
 
 // --- Entity tags -------------------------------------------------------------------------------------------------------------------------

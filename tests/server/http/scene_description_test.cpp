@@ -1,6 +1,7 @@
 // The scene file's description as the service gives it, and the path in its problems.
-#include "client.hpp"
-#include "scene_patch.hpp"
+#include <penumbra/scene_file.hpp>
+
+#include "server/client.hpp"
 
 namespace penumbra::test {
 namespace {
@@ -21,7 +22,7 @@ TEST(SceneDescriptionOverHttp, OpenApiDescribesTheScene)
         ASSERT_TRUE(target.starts_with("#/")) << target;
         EXPECT_TRUE(api.contains(Json::json_pointer(target.substr(1)))) << target;
     }
-    for (const std::string_view section : server::patched_sections)
+    for (const std::string_view section : patched_sections())
         EXPECT_TRUE(api["components"]["schemas"]["ScenePatch"]["properties"].contains(section)) << section;
 }
 
