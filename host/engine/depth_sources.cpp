@@ -15,8 +15,8 @@ namespace {
 
 [[noreturn]] void missing(const char* key, const char* role, const std::string& hint = {})
 {
-    throw Error(ErrorCode::invalid_input, std::string(key) + ": is missing and there are no objects that " + role + " to render it from",
-                "expected a depth image or objects" + hint);
+    throw Error::at(ErrorCode::invalid_input, std::string(key), std::string("is missing and there are no objects that ") + role + " to render it from",
+                    "expected a depth image or objects" + hint);
 }
 
 // How far a camera's place may be from the light's centre and still count as there: float32 rounding of either, with room for a chain of a
@@ -41,9 +41,10 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
     const double turned =
         std::max({(camera.frame.x - frame.u).length(), (camera.frame.y - frame.v).length(), (camera.frame.z + frame.direction).length()});
     if (frame.directional || (camera.frame.origin - frame.origin).length() > place_tolerance(frame, camera.frame.origin) || turned > 1e-4)
-        throw Error(ErrorCode::invalid_input, "occluders.camera: is not the light's own view",
-                    "expected kind \"light\", or a pinhole at the light's centre along its axes; depth from another camera can be given in "
-                    "objects");
+        throw Error::at(
+            ErrorCode::invalid_input, "occluders.camera", "is not the light's own view",
+            "expected kind \"light\", or a pinhole at the light's centre along its axes; depth from another camera can be given in "
+            "objects");
     return light_camera(frame, camera.half_extent, frame.origin);
 }
 
@@ -60,8 +61,8 @@ void check_pixels(int width, int height, std::string_view where)
     // below 2^31.
     constexpr std::int64_t limit = std::int64_t{1} << 30;
     if (width > 65536 || height > 65536 || std::int64_t{width} * height > limit)
-        throw Error(ErrorCode::too_large, std::string(where) + ": is " + std::to_string(width) + " x " + std::to_string(height),
-                    "expected at most 65536 each way and " + std::to_string(limit) + " pixels");
+        throw Error::at(ErrorCode::too_large, std::string(where), "is " + std::to_string(width) + " x " + std::to_string(height),
+                        "expected at most 65536 each way and " + std::to_string(limit) + " pixels");
 }
 
 void check_size(const DepthMap& map, int width, int height, std::string_view where)
@@ -69,10 +70,10 @@ void check_size(const DepthMap& map, int width, int height, std::string_view whe
     check_pixels(width, height, where);
     const std::size_t count = static_cast<std::size_t>(std::max(width, 0)) * static_cast<std::size_t>(std::max(height, 0));
     if (width < 1 || height < 1 || map.width != width || map.height != height || map.depth.size() != count)
-        throw Error(ErrorCode::invalid_input,
-                    std::string(where) + ": is " + std::to_string(map.width) + " x " + std::to_string(map.height) + " with " +
-                        std::to_string(map.depth.size()) + " depths",
-                    "expected " + std::to_string(width) + " x " + std::to_string(height));
+        throw Error::at(ErrorCode::invalid_input, std::string(where),
+                        "is " + std::to_string(map.width) + " x " + std::to_string(map.height) + " with " +
+                            std::to_string(map.depth.size()) + " depths",
+                        "expected " + std::to_string(width) + " x " + std::to_string(height));
 }
 
 Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs)

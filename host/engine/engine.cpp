@@ -19,13 +19,13 @@ const DeviceInfo& Engine::device() const { return impl_->context->info(); }
 void check_device_buffer(cl_mem buffer, int width, int height, const char* what)
 {
     if (!buffer || width < 1 || height < 1)
-        throw Error(ErrorCode::usage, std::string(what) + ": is null or has no size", "expected a buffer of width * height floats");
+        throw Error::at(ErrorCode::usage, std::string(what), "is null or has no size", "expected a buffer of width * height floats");
     check_pixels(width, height, what);
     std::size_t bytes = 0;
     const std::size_t needed = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * sizeof(float);
     if (clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof(bytes), &bytes, nullptr) != CL_SUCCESS || bytes < needed)
-        throw Error(ErrorCode::usage, std::string(what) + ": holds " + std::to_string(bytes) + " bytes",
-                    "expected at least " + std::to_string(needed) + ": width * height floats");
+        throw Error::at(ErrorCode::usage, std::string(what), "holds " + std::to_string(bytes) + " bytes",
+                        "expected at least " + std::to_string(needed) + ": width * height floats");
 }
 
 } // namespace penumbra

@@ -245,8 +245,8 @@ Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(
 Mask Engine::mask(const Scene& scene, const Technique& technique) const
 {
     if (const int frames = frame_count(scene); frames > 0)
-        throw Error(ErrorCode::usage, "light.emission: is a sequence of " + std::to_string(frames) + " images, expected one",
-                    "masks computes them all, only_frame takes one");
+        throw Error::at(ErrorCode::usage, "light.emission", "is a sequence of " + std::to_string(frames) + " images, expected one",
+                        "masks computes them all, only_frame takes one");
     std::optional<Mask> last;
     masks(scene, technique, [&](NamedMask&& named) { last = std::move(named.mask); });
     return std::move(*last);

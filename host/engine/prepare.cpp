@@ -23,8 +23,8 @@ bool has_no_extent(const Light& light)
 void refuse_sequence(const Light& light)
 {
     if (const std::size_t frames = frames_of(light); frames > 0)
-        throw Error(ErrorCode::usage, "light.emission: is a sequence of " + std::to_string(frames) + " images, expected one",
-                    "masks computes them all, only_frame takes one, with_emission goes on to the next");
+        throw Error::at(ErrorCode::usage, "light.emission", "is a sequence of " + std::to_string(frames) + " images, expected one",
+                        "masks computes them all, only_frame takes one, with_emission goes on to the next");
 }
 
 std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::Context>& context, const Light& light,
@@ -75,12 +75,12 @@ void check_casters(const Needs& needs, bool casters, const Occluders& given, con
 {
     if (casters || needs.casters == Needs::Casters::unused) return;
     if (needs.casters == Needs::Casters::required)
-        throw Error(ErrorCode::invalid_input, "objects: " + technique + " needs objects that cast, and there are none",
-                    "expected meshes, quads, or a camera's depth as an object");
+        throw Error::at(ErrorCode::invalid_input, "objects", technique + " needs objects that cast, and there are none",
+                        "expected meshes, quads, or a camera's depth as an object");
     if (!given.front)
-        throw Error(ErrorCode::invalid_input,
-                    "objects: " + technique + " needs objects that cast or occluders.depth.front, and there are neither",
-                    "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
+        throw Error::at(ErrorCode::invalid_input, "objects",
+                        technique + " needs objects that cast or occluders.depth.front, and there are neither",
+                        "expected meshes, quads, a camera's depth as an object, or the light's view in occluders.depth.front");
 }
 
 // The maps that prepare is handed: those that it needs, or all that there are where they stand for the objects.
@@ -128,8 +128,8 @@ void prepare_technique(Prepared::State& state, const Casting& casting)
 {
     opencl::Work work(state.context);
     Findings findings;
-    state.data = std::visit(
-        [&](const auto& settings) -> PreparedTechnique { return prepare(work, casting, settings, findings); }, state.technique);
+    state.data =
+        std::visit([&](const auto& settings) -> PreparedTechnique { return prepare(work, casting, settings, findings); }, state.technique);
     state.light_view = findings.view;
     state.channels = findings.channels;
     state.warnings.insert(state.warnings.end(), findings.warnings.begin(), findings.warnings.end());
@@ -158,11 +158,12 @@ void check_light(const Light& light, const Technique& technique)
     if (!takes(kind) && !(has_no_extent(light) && takes("point"))) {
         std::string hint = "it takes " + joined(row.lights);
         if (kind == "sphere") hint += "; a rectangle of the same area has half-edges of 0.886 times the radius";
-        throw Error(ErrorCode::unsupported, "light.kind: " + std::string(row.kind) + " cannot take a " + kind + " light", hint);
+        throw Error::at(ErrorCode::unsupported, "light.kind", std::string(row.kind) + " cannot take a " + kind + " light", hint);
     }
     const auto* rectangle = std::get_if<RectangleLight>(&light);
     if (rectangle && (rectangle->emission || !rectangle->frames.empty()) && !row.textured_lights)
-        throw Error(ErrorCode::unsupported, "light.emission: " + std::string(row.kind) + " cannot take a textured light", "ray_traced can");
+        throw Error::at(ErrorCode::unsupported, "light.emission", std::string(row.kind) + " cannot take a textured light",
+                        "ray_traced can");
 }
 
 double work_ms(const std::vector<Stage>& stages)
@@ -195,8 +196,8 @@ Prepared Engine::prepare(const Light& light, const Occluders& occluders, const T
 Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 {
     if (!scene.lights.empty())
-        throw Error(ErrorCode::usage, "lights: are " + std::to_string(scene.lights.size()) + ", and one can be prepared",
-                    "masks computes them all, only_light takes one");
+        throw Error::at(ErrorCode::usage, "lights", "are " + std::to_string(scene.lights.size()) + ", and one can be prepared",
+                        "masks computes them all, only_light takes one");
     return prepare(scene.light, scene.occluders, view_of(scene), technique);
 }
 
@@ -232,7 +233,8 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
 {
     const Prepared::State& before = prepared.state();
     auto* rectangle = std::get_if<RectangleLight>(&before.light);
-    if (!rectangle) throw Error(ErrorCode::usage, "light.emission: was prepared for a " + kind_of(before.light), "expected a rectangle");
+    if (!rectangle)
+        throw Error::at(ErrorCode::usage, "light.emission", "was prepared for a " + kind_of(before.light), "expected a rectangle");
     auto state =
         new_state(before.context, RectangleLight{rectangle->center, rectangle->half_u, rectangle->half_v, emission}, before.technique);
     state->light_view = before.light_view;

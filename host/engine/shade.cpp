@@ -88,7 +88,8 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
 {
     const Prepared::State& state = prepared.state();
     if (!receivers.depth)
-        throw Error(ErrorCode::invalid_input, "receivers.depth: is missing", "expected a depth map; with_depth renders it from objects");
+        throw Error::at(ErrorCode::invalid_input, "receivers.depth", "is missing",
+                        "expected a depth map; with_depth renders it from objects");
     check_size(*receivers.depth, receivers.width, receivers.height, "receivers.depth");
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
 
@@ -137,8 +138,8 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
 
     opencl::Work work(state.context, queue);
     work.stage("shade");
-    const Receiving receiving{.camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height,
-                                                       "receivers.camera"),
+    const Receiving receiving{.camera =
+                                  resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera"),
                               .width = receivers.width,
                               .height = receivers.height,
                               .depth = nullptr,

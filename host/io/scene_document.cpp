@@ -122,10 +122,7 @@ Scene SceneDocument::lights(const Resources& resources) const
     return scene;
 }
 
-void SceneDocument::add_occluders(Scene& scene, const Resources& resources) const
-{
-    parse_all_occluders(state_->root(), resources, scene);
-}
+void SceneDocument::add_occluders(Scene& scene, const Resources& resources) const { parse_all_occluders(state_->root(), resources, scene); }
 
 Receivers SceneDocument::receivers(const Light& first, const Resources& resources, std::vector<std::string>& warnings) const
 {

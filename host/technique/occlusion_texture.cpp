@@ -53,16 +53,16 @@ bool is_layered(const OcclusionTexture& settings)
 
 void check_settings(const LightFrame& light, const OcclusionTexture& settings)
 {
-    const auto refuse = [](const std::string& what, const std::string& expected) {
-        throw Error(ErrorCode::invalid_input, "technique." + what, expected);
+    const auto refuse = [](const std::string& key, const std::string& what, const std::string& expected) {
+        throw Error::at(ErrorCode::invalid_input, "technique." + key, what, expected);
     };
     if (settings.light_splits > 1 && light.directional)
-        refuse("light_splits: is " + std::to_string(settings.light_splits) + " and the light directional",
+        refuse("light_splits", "is " + std::to_string(settings.light_splits) + " and the light directional",
                "expected 1: only rectangles are split");
     if (settings.leak_fix && (settings.combine != Combine::product && settings.combine != Combine::max))
-        refuse("leak_fix: is true and combine adds slices up", "expected combine product or max: a sum would count each surface twice");
+        refuse("leak_fix", "is true and combine adds slices up", "expected combine product or max: a sum would count each surface twice");
     if (settings.placement == Placement::reciprocal && light.directional)
-        refuse("placement: is reciprocal and the light directional", "expected uniform or occupied: such a light has no nearest depth");
+        refuse("placement", "is reciprocal and the light directional", "expected uniform or occupied: such a light has no nearest depth");
 }
 
 // The slices' planes as shading needs them, all layers of each.
@@ -240,10 +240,10 @@ void check_memory(const opencl::Context& context, const Marked& marked, std::uin
     const DeviceInfo& device = context.info();
     const std::uint64_t most = std::min(device.max_allocation_bytes, device.global_bytes), size = element_size(kind, settings);
     if (elements * size <= most) return;
-    throw Error(ErrorCode::too_large,
-                "technique.resolution: " + std::to_string(settings.slices) + " slices of " + std::to_string(settings.resolution) +
-                    " texels each way take " + std::to_string(elements * size) + " bytes, the device allows " + std::to_string(most),
-                what_fits(marked, most / size, kind, directional, settings));
+    throw Error::at(ErrorCode::too_large, "technique.resolution",
+                    std::to_string(settings.slices) + " slices of " + std::to_string(settings.resolution) + " texels each way take " +
+                        std::to_string(elements * size) + " bytes, the device allows " + std::to_string(most),
+                    what_fits(marked, most / size, kind, directional, settings));
 }
 
 void build_tables(opencl::Work& work, const opencl::Specialisation& program, const Marked& marked, const OcclusionTexture& settings,
@@ -486,8 +486,7 @@ PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, con
     std::optional<SolidMaps> solid;
     if (casting.meshes.empty() && maps.back) solid.emplace(*maps.front, *maps.back, maps.camera);
 
-    PreparedOcclusionTexture prepared =
-        prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings);
+    PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings);
     findings.view = prepared.view;
     findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     findings.notes = prepared.notes;
@@ -504,11 +503,11 @@ void shade(opencl::Work& work, const PreparedOcclusionTexture& prepared, const R
 std::vector<WorkAmount> work(const OcclusionTexture& settings, const MaskShape& shape)
 {
     // Lookups of a receiver, and texels of the slices that are prefiltered.
-    const double textures = shape.lights() * settings.light_splits * settings.light_splits * settings.slices *
-        (is_layered(settings) ? settings.layers : 1);
-    return {{"technique.slices", textures * shape.pixels(), WorkAmount::Unit::pairs, "pairs of slice and receiver"},
-            {"technique.resolution", textures * settings.resolution * settings.resolution, WorkAmount::Unit::slice_texels,
-             "texels of slices"}};
+    const double textures =
+        shape.lights() * settings.light_splits * settings.light_splits * settings.slices * (is_layered(settings) ? settings.layers : 1);
+    return {
+        {"technique.slices", textures * shape.pixels(), WorkAmount::Unit::pairs, "pairs of slice and receiver"},
+        {"technique.resolution", textures * settings.resolution * settings.resolution, WorkAmount::Unit::slice_texels, "texels of slices"}};
 }
 
 std::vector<opencl::Specialisation> specialisations(const OcclusionTexture& settings, int lanes)

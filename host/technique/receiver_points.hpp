@@ -11,8 +11,8 @@ namespace penumbra {
 // Rows of a tile of receivers (see soft_shadow_map.cl; the width is TILE_WIDTH of common/shared.h).
 constexpr int tile_rows = 8;
 
-// The program of receivers.cl by itself. A technique's kernel file includes it and occluders.cl, and the technique launches all it needs from
-// its own program: drivers take tens of milliseconds a program even from their caches.
+// The program of receivers.cl by itself. A technique's kernel file includes it and occluders.cl, and the technique launches all it needs
+// from its own program: drivers take tens of milliseconds a program even from their caches.
 opencl::Specialisation receivers_program();
 
 // Padded lists, `view.rows` x `view.stride`.

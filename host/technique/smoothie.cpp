@@ -75,9 +75,9 @@ double light_radius(const LightFrame& light)
 void check_settings(const Smoothie& settings)
 {
     if (settings.t_from == SmoothieWidth::light && settings.t != Smoothie{}.t)
-        throw Error(ErrorCode::invalid_input,
-                    "technique.t: is " + std::to_string(settings.t) + " and t_from light, which makes t of the light's size",
-                    "set technique.t_from to \"t\", or leave t out");
+        throw Error::at(ErrorCode::invalid_input, "technique.t",
+                        "is " + std::to_string(settings.t) + " and t_from light, which makes t of the light's size",
+                        "set technique.t_from to \"t\", or leave t out");
 }
 
 SmoothieView view_of(const OccluderDepth& depth, const SmoothieEdges& edges, const Smoothie& settings)
@@ -150,25 +150,25 @@ std::shared_ptr<const Topology> topology_of(const Casting& casting, const Smooth
 TechniqueRow row(const Smoothie&)
 {
     using S = Smoothie;
-    return {.kind = "smoothie",
-            .summary = "A shadow map with fins at its silhouettes: soft edges that harden at contact, for little more than the map; the "
-                       "umbra stays whole.",
-            .source = "Chan, Durand: Rendering Fake Soft Shadows with Smoothies, Eurographics Symposium on Rendering 2003",
-            .keys = {choice_key<S>("t_from", &S::t_from, t_from_names,
-                                   "how wide smoothies are: as half of what the light's size casts, or t"),
-                     real_key<S>("t", &S::t, {0, 2}, "half widths of the light's image", "the paper's t; with t_from t"),
-                     choice_key<S>("silhouettes", &S::silhouettes, silhouettes_names,
-                                   "edges of the objects that cast, or of the depth map; without objects: of the map"),
-                     choice_key<S>("falloff", &S::falloff, falloff_names, "of visibility across a smoothie"),
-                     flag_key<S>("two_sided", &S::two_sided,
-                                 "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks"),
-                     real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
-                                 "self-shadow bound from the surface's slope; 1 is the bound, 0 none")},
-            .lights = {"rectangle", "sphere", "point", "directional"},
-            .textured_lights = false,
-            .inputs = "occluder depth (front) from the light's centre (or objects that cast); objects that cast, for their silhouettes; "
-                      "receiver depth (or objects)",
-            .defaults = Smoothie{}};
+    return {
+        .kind = "smoothie",
+        .summary = "A shadow map with fins at its silhouettes: soft edges that harden at contact, for little more than the map; the "
+                   "umbra stays whole.",
+        .source = "Chan, Durand: Rendering Fake Soft Shadows with Smoothies, Eurographics Symposium on Rendering 2003",
+        .keys = {choice_key<S>("t_from", &S::t_from, t_from_names, "how wide smoothies are: as half of what the light's size casts, or t"),
+                 real_key<S>("t", &S::t, {0, 2}, "half widths of the light's image", "the paper's t; with t_from t"),
+                 choice_key<S>("silhouettes", &S::silhouettes, silhouettes_names,
+                               "edges of the objects that cast, or of the depth map; without objects: of the map"),
+                 choice_key<S>("falloff", &S::falloff, falloff_names, "of visibility across a smoothie"),
+                 flag_key<S>("two_sided", &S::two_sided,
+                             "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks"),
+                 real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
+                             "self-shadow bound from the surface's slope; 1 is the bound, 0 none")},
+        .lights = {"rectangle", "sphere", "point", "directional"},
+        .textured_lights = false,
+        .inputs = "occluder depth (front) from the light's centre (or objects that cast); objects that cast, for their silhouettes; "
+                  "receiver depth (or objects)",
+        .defaults = Smoothie{}};
 }
 
 SmoothieEdges smoothie_edges(const Topology& topology, const Silhouette& silhouette, const Camera& camera)

@@ -86,27 +86,27 @@ void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, 
 TechniqueRow row(const SoftShadowMap&)
 {
     using S = SoftShadowMap;
-    return {.kind = "soft_shadow_map",
-            .summary = "Micro-patches: every texel of the occluder map is projected back onto the light and its share is summed.",
-            .source = "Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion: Soft Shadow Maps, 2006",
-            .keys = {choice_key<S>("sides", &S::sides, sides_names,
-                                   "which occluder maps are used; both merges them by the larger occlusion"),
-                     integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
-                                    "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
-                     choice_key<S>("reduction", &S::reduction, reduction_names,
-                                   "how a larger map becomes `resolution`: by covered area, or by the texel at the centre"),
-                     choice_key<S>("accumulator", &S::accumulator, accumulator_names,
-                                   "how shares are summed; binary16 is the 2006 hardware's blending, for study"),
-                     real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
-                                 "self-shadow bound of receivers on the casters' own surface; 1 is the bound, 0 none"),
-                     flag_key<S>("project", &S::project, "shade in the light's view, then sample that mask from the receivers' camera"),
-                     integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
-                                    "side of the light's-view mask with project")},
-            .lights = {"rectangle", "point"},
-            .textured_lights = false,
-            .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
-                      "(or objects)",
-            .defaults = SoftShadowMap{}};
+    return {
+        .kind = "soft_shadow_map",
+        .summary = "Micro-patches: every texel of the occluder map is projected back onto the light and its share is summed.",
+        .source = "Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion: Soft Shadow Maps, 2006",
+        .keys = {choice_key<S>("sides", &S::sides, sides_names, "which occluder maps are used; both merges them by the larger occlusion"),
+                 integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
+                                "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
+                 choice_key<S>("reduction", &S::reduction, reduction_names,
+                               "how a larger map becomes `resolution`: by covered area, or by the texel at the centre"),
+                 choice_key<S>("accumulator", &S::accumulator, accumulator_names,
+                               "how shares are summed; binary16 is the 2006 hardware's blending, for study"),
+                 real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
+                             "self-shadow bound of receivers on the casters' own surface; 1 is the bound, 0 none"),
+                 flag_key<S>("project", &S::project, "shade in the light's view, then sample that mask from the receivers' camera"),
+                 integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
+                                "side of the light's-view mask with project")},
+        .lights = {"rectangle", "point"},
+        .textured_lights = false,
+        .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
+                  "(or objects)",
+        .defaults = SoftShadowMap{}};
 }
 
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
@@ -208,9 +208,9 @@ DeviceBuffers device_buffers(const SoftShadowMap& settings)
 {
     if (!settings.project) return {};
     return {.prepare = {},
-            .shade = Error(ErrorCode::unsupported,
-                           "project renders the receivers from the light on the host and cannot shade device buffers",
-                           "set project to false")};
+            .shade =
+                Error(ErrorCode::unsupported, "project renders the receivers from the light on the host and cannot shade device buffers",
+                      "set project to false")};
 }
 
 } // namespace penumbra

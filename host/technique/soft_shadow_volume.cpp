@@ -32,18 +32,18 @@ const Image* emission_of(const Light& light)
 void check_settings(const Light& light, const SoftShadowVolume& settings)
 {
     const LightFrame frame = light_frame(light);
-    const auto refuse = [&](const std::string& what, const std::string& expected) {
-        throw Error(ErrorCode::invalid_input, "technique." + what + " and the light a " + kind_of(light), expected);
+    const auto refuse = [&](const std::string& key, const std::string& what, const std::string& expected) {
+        throw Error::at(ErrorCode::invalid_input, "technique." + key, what + " and the light a " + kind_of(light), expected);
     };
     if (settings.light_splits > 1 && frame.shape != LightShape::rectangle)
-        refuse("light_splits: is " + std::to_string(settings.light_splits), "expected 1: only rectangles are split");
+        refuse("light_splits", "is " + std::to_string(settings.light_splits), "expected 1: only rectangles are split");
     if (settings.coverage == Coverage::texture && !std::holds_alternative<RectangleLight>(light))
-        refuse("coverage: is texture", "expected a rectangle, or coverage analytic");
+        refuse("coverage", "is texture", "expected a rectangle, or coverage analytic");
     if (settings.coverage == Coverage::texture && settings.table % 2 != 0)
-        throw Error(ErrorCode::invalid_input, "technique.table: is " + std::to_string(settings.table),
-                    "expected an even number from 4 to 64");
+        throw Error::at(ErrorCode::invalid_input, "technique.table", "is " + std::to_string(settings.table),
+                        "expected an even number from 4 to 64");
     if (emission_of(light) && settings.coverage != Coverage::texture)
-        throw Error(ErrorCode::invalid_input, "light.emission: needs coverage texture", "set technique.coverage to \"texture\"");
+        throw Error::at(ErrorCode::invalid_input, "light.emission", "needs coverage texture", "set technique.coverage to \"texture\"");
 }
 
 int item_rows(int lanes) { return lanes == 1 ? 1 : tile_rows; }
@@ -373,8 +373,7 @@ PreparedSoftShadowVolume prepare(opencl::Work& work, const Casting& casting, con
 
     work.stage("prepare");
     findings.view = wedge_view(casting.light);
-    PreparedSoftShadowVolume prepared =
-        prepare_soft_shadow_volume(work, casting.light, {.topology = *topology, .texel = texel}, settings);
+    PreparedSoftShadowVolume prepared = prepare_soft_shadow_volume(work, casting.light, {.topology = *topology, .texel = texel}, settings);
     findings.channels = prepared.channels;
     findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     if (prepared.triangles == 0) findings.warnings.emplace_back("no triangle faces the light: nothing casts shadows");
@@ -407,9 +406,9 @@ std::vector<opencl::Specialisation> specialisations(const SoftShadowVolume& sett
 
 DeviceBuffers device_buffers(const SoftShadowVolume&)
 {
-    return {.prepare = Error(ErrorCode::unsupported,
-                             "soft_shadow_volume finds silhouettes on the host and cannot prepare from device buffers",
-                             "prepare it from objects, or from depth maps in memory"),
+    return {.prepare =
+                Error(ErrorCode::unsupported, "soft_shadow_volume finds silhouettes on the host and cannot prepare from device buffers",
+                      "prepare it from objects, or from depth maps in memory"),
             .shade = {}};
 }
 

@@ -61,8 +61,8 @@ const SettingKey& key_of(const TechniqueRow& row, const std::string& name)
 {
     for (const SettingKey& key : row.keys)
         if (key.name == name) return key;
-    throw Error(ErrorCode::invalid_input, "technique." + name + ": unknown key of " + std::string(row.kind),
-                "known keys: " + joined(row.keys, &SettingKey::name));
+    throw Error::at(ErrorCode::invalid_input, "technique." + name, "unknown key of " + std::string(row.kind),
+                    "known keys: " + joined(row.keys, &SettingKey::name));
 }
 
 template <class... S> std::vector<TechniqueRow> rows_of(std::type_identity<std::variant<S...>>) { return {row(S{})...}; }
@@ -79,8 +79,8 @@ const TechniqueRow& row_of(std::string_view kind)
 {
     for (const TechniqueRow& row : technique_table())
         if (row.kind == kind) return row;
-    throw Error(ErrorCode::invalid_input, "technique.kind: unknown technique \"" + std::string(kind) + "\"",
-                "known: " + joined(technique_table(), &TechniqueRow::kind));
+    throw Error::at(ErrorCode::invalid_input, "technique.kind", "unknown technique \"" + std::string(kind) + "\"",
+                    "known: " + joined(technique_table(), &TechniqueRow::kind));
 }
 
 Technique technique_from(const TechniqueRequest& request)
@@ -92,7 +92,7 @@ Technique technique_from(const TechniqueRequest& request)
         Conversion conversion{value, {}};
         const auto converted = std::visit([&conversion](const auto& domain) { return conversion(domain); }, key.domain);
         if (!converted)
-            throw Error(ErrorCode::invalid_input, "technique." + name + ": is " + text_of(value), "expected " + conversion.expected);
+            throw Error::at(ErrorCode::invalid_input, "technique." + name, "is " + text_of(value), "expected " + conversion.expected);
         key.set(technique, *converted);
     }
     return technique;

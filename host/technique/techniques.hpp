@@ -18,13 +18,26 @@ namespace penumbra {
 // A technique that lacks a verb stops the build here.
 template <class S>
 concept HasVerbs = requires(const S& settings, opencl::Work& work, const Casting& casting, Findings& findings, const Receiving& receivers,
-                            Shaded& shaded, const MaskShape& shape) {
-    { row(settings) } -> std::same_as<TechniqueRow>;
-    { needs(settings) } -> std::same_as<Needs>;
-    { shade(work, prepare(work, casting, settings, findings), receivers, shaded) } -> std::same_as<void>;
-    { penumbra::work(settings, shape) } -> std::same_as<std::vector<WorkAmount>>;
-    { specialisations(settings, 16) } -> std::same_as<std::vector<opencl::Specialisation>>;
-    { device_buffers(settings) } -> std::same_as<DeviceBuffers>;
+                            Shaded& shaded, const MaskShape& shape)
+{
+    {
+        row(settings)
+        } -> std::same_as<TechniqueRow>;
+    {
+        needs(settings)
+        } -> std::same_as<Needs>;
+    {
+        shade(work, prepare(work, casting, settings, findings), receivers, shaded)
+        } -> std::same_as<void>;
+    {
+        penumbra::work(settings, shape)
+        } -> std::same_as<std::vector<WorkAmount>>;
+    {
+        specialisations(settings, 16)
+        } -> std::same_as<std::vector<opencl::Specialisation>>;
+    {
+        device_buffers(settings)
+        } -> std::same_as<DeviceBuffers>;
 };
 
 template <class S> struct PreparedBy {

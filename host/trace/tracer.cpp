@@ -65,10 +65,10 @@ void Tracer::Impl::take(std::span<const TriangleMesh* const> meshes)
     }
     constexpr std::uint64_t limit = std::numeric_limits<std::uint32_t>::max() - 1;
     if (vertex_count > limit || triangle_count > limit)
-        throw Error(ErrorCode::too_large,
-                    "objects: " + std::to_string(vertex_count) + " vertices and " + std::to_string(triangle_count) +
-                        " triangles are too many to trace",
-                    "expected at most " + std::to_string(limit) + " of each");
+        throw Error::at(ErrorCode::too_large, "objects",
+                        std::to_string(vertex_count) + " vertices and " + std::to_string(triangle_count) +
+                            " triangles are too many to trace",
+                        "expected at most " + std::to_string(limit) + " of each");
 
     // The triangles that can be hit, and how far their corners are from the origin.
     triangles.reserve(triangle_count);

@@ -277,10 +277,10 @@ void require(const VisibilityOptions& options, const DepthMap& receivers)
     const bool sized = receivers.width >= 1 && receivers.height >= 1 &&
                        receivers.depth.size() == static_cast<std::size_t>(receivers.width) * static_cast<std::size_t>(receivers.height);
     if (!sized)
-        throw Error(ErrorCode::usage,
-                    "receivers.depth: is " + std::to_string(receivers.width) + " x " + std::to_string(receivers.height) + " with " +
-                        std::to_string(receivers.depth.size()) + " values",
-                    "expected at least 1 x 1 and as many values as pixels");
+        throw Error::at(ErrorCode::usage, "receivers.depth",
+                        "is " + std::to_string(receivers.width) + " x " + std::to_string(receivers.height) + " with " +
+                            std::to_string(receivers.depth.size()) + " values",
+                        "expected at least 1 x 1 and as many values as pixels");
 }
 
 } // namespace

@@ -66,7 +66,7 @@ struct KeptScene::Changes {
     bool same(const char* section) const
     {
         return before.has(section) == after.has(section) && before.text(section) == after.text(section) &&
-            !after.names_file(section, names);
+               !after.names_file(section, names);
     }
     bool same_lights() const { return same("light") && same("lights"); }
 };

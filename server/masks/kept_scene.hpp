@@ -37,8 +37,8 @@ public:
     // Names what a task of that patch and those parts depends on.
     std::string content_of(std::string_view patch, std::span<const Part> extra) const;
 
-    // What to compute a mask from: the scene with `patch` (SceneDocument::patched), an empty one to take it as it stands. The images that the
-    // patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.
+    // What to compute a mask from: the scene with `patch` (SceneDocument::patched), an empty one to take it as it stands. The images that
+    // the patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.
     MaskTask task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,
                   const Deadline& deadline) const;
 
@@ -56,8 +56,7 @@ private:
     // What decides whether a kept piece still holds.
     struct Changes;
     void check_objects(const Changes& changes) const;
-    std::vector<MaskLight> patched_lights(const Changes& changes, const Resources& resources,
-                                          std::vector<std::string>& warnings) const;
+    std::vector<MaskLight> patched_lights(const Changes& changes, const Resources& resources, std::vector<std::string>& warnings) const;
     static void choose(const Changes& changes, const std::vector<MaskLight>& lights, bool same_occluders, const MaskChoice& choice,
                        MaskTask& task);
 

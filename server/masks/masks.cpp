@@ -62,9 +62,8 @@ template <class Call> void with_hooks(const MaskTask& task, const Deadline& dead
 Mask mask_of(const Engine& engine, const MaskTask& task, const Deadline& deadline)
 {
     Mask last;
-    with_hooks(task, deadline, [&](const MaskHooks& hooks) {
-        engine.masks(task.job, hooks, [&](NamedMask&& named) { last = std::move(named.mask); });
-    });
+    with_hooks(task, deadline,
+               [&](const MaskHooks& hooks) { engine.masks(task.job, hooks, [&](NamedMask&& named) { last = std::move(named.mask); }); });
     return last;
 }
 

@@ -9,7 +9,6 @@
 
 #include <penumbra/error.hpp>
 
-
 namespace penumbra::server {
 
 RequestResources::~RequestResources()

@@ -15,8 +15,8 @@ std::string side_text(int width, int height) { return std::to_string(width) + " 
 void check_pixels(std::string_view where, int width, int height, std::int64_t limit)
 {
     if (static_cast<std::int64_t>(width) * height > limit)
-        throw Error(ErrorCode::too_large, std::string(where) + ": is " + side_text(width, height),
-                    "the limit of the service is " + std::to_string(limit) + " pixels");
+        throw Error::at(ErrorCode::too_large, std::string(where), "is " + side_text(width, height),
+                        "the limit of the service is " + std::to_string(limit) + " pixels");
 }
 
 void check_amount(std::string_view where, double amount, std::string_view what, std::int64_t limit)
@@ -24,18 +24,22 @@ void check_amount(std::string_view where, double amount, std::string_view what, 
     if (amount <= static_cast<double>(limit)) return;
     std::array<char, 32> text{};
     std::snprintf(text.data(), text.size(), "%.3g", amount);
-    throw Error(ErrorCode::too_large, std::string(where) + ": asks for " + text.data() + " " + std::string(what),
-                "the limit of the service is " + std::to_string(limit));
+    throw Error::at(ErrorCode::too_large, std::string(where), std::string("asks for ") + text.data() + " " + std::string(what),
+                    "the limit of the service is " + std::to_string(limit));
 }
 
 // The option that bounds work counted in that unit.
 std::int64_t limit_of(WorkAmount::Unit unit, const Options& options)
 {
     switch (unit) {
-    case WorkAmount::Unit::pairs: return options.pairs;
-    case WorkAmount::Unit::rays: return options.rays;
-    case WorkAmount::Unit::slice_texels: return options.image_samples;
-    case WorkAmount::Unit::receivers: return options.receivers;
+    case WorkAmount::Unit::pairs:
+        return options.pairs;
+    case WorkAmount::Unit::rays:
+        return options.rays;
+    case WorkAmount::Unit::slice_texels:
+        return options.image_samples;
+    case WorkAmount::Unit::receivers:
+        return options.receivers;
     }
     return 0;
 }
@@ -57,8 +61,7 @@ void check_work(const MaskTask& task, const Options& options)
         check_amount("lights", points, "receivers, over all lights", options.receivers);
         check_amount("lights", texels, "texels of occluder maps, over all lights", options.image_samples);
     }
-    for (const WorkAmount& work : work_of(task.job))
-        check_amount(work.key, work.amount, work.what, limit_of(work.unit, options));
+    for (const WorkAmount& work : work_of(task.job)) check_amount(work.key, work.amount, work.what, limit_of(work.unit, options));
 }
 
 } // namespace penumbra::server

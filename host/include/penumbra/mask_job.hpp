@@ -38,8 +38,8 @@ struct MaskJob {
     bool combined = false;                  // whether the mask of all lights together is wanted, after theirs
 };
 
-// The job of a scene. The first form copies neither depth nor objects: the scene has to stay as long as the job. The second takes the scene.
-// Throws invalid_input where the scene's lights do not go together.
+// The job of a scene. The first form copies neither depth nor objects: the scene has to stay as long as the job. The second takes the
+// scene. Throws invalid_input where the scene's lights do not go together.
 PENUMBRA_API MaskJob job_of(const Scene& scene, const Technique& technique);
 PENUMBRA_API MaskJob job_of(Scene&& scene, const Technique& technique);
 
@@ -62,8 +62,8 @@ public:
 // Who takes part in a run. Both may be left out.
 struct MaskHooks {
     MaskKeeper* keeper = nullptr;
-    // Called before each step that may take long, with what comes next ("preparing", "the receivers' depth", "shading"). What it throws ends
-    // the run.
+    // Called before each step that may take long, with what comes next ("preparing", "the receivers' depth", "shading"). What it throws
+    // ends the run.
     std::function<void(std::string_view next)> before = {};
 };
 

@@ -66,12 +66,13 @@ public:
     // Throws invalid_input for text that is no JSON.
     explicit SceneDocument(std::string_view json);
 
-    // With a JSON Merge Patch (RFC 7396) merged in; an empty one changes nothing. A light, camera or technique whose `kind` differs from the one
-    // before replaces it instead: keys of one kind mean nothing to another. Lists, `lights` among them, are replaced whole. Throws
+    // With a JSON Merge Patch (RFC 7396) merged in; an empty one changes nothing. A light, camera or technique whose `kind` differs from
+    // the one before replaces it instead: keys of one kind mean nothing to another. Lists, `lights` among them, are replaced whole. Throws
     // invalid_input for other sections than patched_sections(), naming them.
     SceneDocument patched(std::string_view patch) const;
 
-    // The text of all of it, of a section, or of a light (no place: of `light`), that is the same for the same content; empty: there is none.
+    // The text of all of it, of a section, or of a light (no place: of `light`), that is the same for the same content; empty: there is
+    // none.
     std::string text() const;
     std::string text(std::string_view section) const;
     std::string light_text(std::optional<std::size_t> place) const;
