@@ -1,4 +1,5 @@
-// A mesh, in a file with the extension FUZZ_EXTENSION.
+// A mesh, in a file whose extension is what the program's name ends with: fuzz_mesh_ply reads .ply.
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -27,7 +28,8 @@ public:
     }
     std::string write(std::string_view text) const
     {
-        const std::string path = (folder_ / ("mesh" FUZZ_EXTENSION)).string();
+        const std::string program = program_invocation_short_name;
+        const std::string path = (folder_ / ("mesh." + program.substr(program.rfind('_') + 1))).string();
         std::ofstream out(path, std::ios::binary | std::ios::trunc);
         out.write(text.data(), static_cast<std::streamsize>(text.size()));
         expect(static_cast<bool>(out.flush()), "cannot write " + path);
