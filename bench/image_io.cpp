@@ -108,7 +108,9 @@ void encode_rows(const char* name, const Image& mask)
 
 void image_io(const Engine& engine)
 {
-    configure_openimageio(); // one thread, as for all else that goes through it
+    // One thread, as for all that goes through it in penumbra.
+    OIIO::attribute("threads", 1);
+    OIIO::attribute("exr_threads", 1);
     std::puts("# | 512 x 512, one channel | OpenImageIO: bytes | ms min / median / max | penumbra: bytes | ms min / median / max |");
     std::puts("# | --- | --- | --- | --- | --- |");
     const SceneOptions options{.light_side = 1, .occluder_resolution = 512};

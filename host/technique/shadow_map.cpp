@@ -69,7 +69,7 @@ Needs needs(const ShadowMap&) { return {.front = true}; }
 PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const ShadowMap& settings, Findings& findings)
 {
     if (const LightFrame frame = light_frame(casting.light); frame.half_u > 0 || frame.half_v > 0)
-        findings.warnings.push_back("shadow_map takes the light as a point at its centre: its extent is ignored");
+        findings.warnings.emplace_back("shadow_map takes the light as a point at its centre: its extent is ignored");
     if (casting.depth.front && is_empty(*casting.depth.front)) findings.warnings.emplace_back(empty_map);
     findings.view = casting.depth.camera;
     const DeviceDepth maps = on_device(work, casting, true, false);
