@@ -112,7 +112,9 @@ inline Reply ask(int port, std::string_view request)
 
 inline Reply get(int port, const std::string& path, const std::string& headers = {})
 {
-    return ask(port, "GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n");
+    std::string request = "GET ";
+    request.append(path).append(" HTTP/1.1\r\nHost: 127.0.0.1\r\n").append(headers).append("\r\n");
+    return ask(port, request);
 }
 
 // --- Requests ----------------------------------------------------------------------------------------------------------------------

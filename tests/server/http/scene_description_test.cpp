@@ -14,7 +14,8 @@ TEST(SceneDescriptionOverHttp, OpenApiDescribesTheScene)
     const Json& post = api["paths"]["/v1/masks"]["post"]["requestBody"]["content"]["multipart/form-data"]["schema"];
     EXPECT_EQ(post["properties"]["scene"]["$ref"], "#/components/schemas/Scene");
     const Json& scene = api["components"]["schemas"]["Scene"];
-    for (const auto& [key, value] : scene_json().items()) EXPECT_TRUE(scene["properties"].contains(key)) << key;
+    const Json sent = scene_json();
+    for (const auto& [key, value] : sent.items()) EXPECT_TRUE(scene["properties"].contains(key)) << key;
     const Json flat = api.flatten();
     for (const auto& [place, value] : flat.items()) {
         if (!place.ends_with("/$ref")) continue;
