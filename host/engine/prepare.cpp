@@ -190,6 +190,8 @@ void add_stages(std::vector<Stage>& all, const std::vector<Stage>& more)
 
 Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Technique& technique) const
 {
+    if (needs_of(technique).casters == Needs::Casters::required)
+        throw Error(ErrorCode::usage, kind_of(technique) + " needs objects", "prepare it from a scene");
     return prepare(light, occluders, Geometry(std::vector<Object>{}), technique);
 }
 

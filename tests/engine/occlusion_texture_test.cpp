@@ -487,7 +487,7 @@ void expect_refused(const Scene& scene, const OcclusionTexture& s, ErrorCode cod
 {
     const Error error = error_of([&] { engine().mask(scene, s); });
     EXPECT_EQ(error.code(), code) << error.what();
-    EXPECT_TRUE(holds(error.message(), message)) << error.what();
+    EXPECT_TRUE(holds(error.what(), message)) << error.what();
     EXPECT_TRUE(holds(error.hint(), hint)) << error.what() << " / " << error.hint();
 }
 
@@ -529,7 +529,7 @@ TEST(SlicesErrors, NumbersOutOfRange)
             technique_from({.kind = "occlusion_texture", .settings = {{k, std::int64_t{v}}}});
         });
         EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-        EXPECT_TRUE(holds(error.message(), "technique." + std::string(key)) && holds(error.message(), std::to_string(value)))
+        EXPECT_TRUE(holds(error.what(), "technique." + std::string(key)) && holds(error.what(), std::to_string(value)))
             << error.what();
     }
 }
@@ -561,7 +561,7 @@ TEST(SlicesErrors, MapsOfOtherSizesAndDeviceBuffers)
     o.layers = {flat(8, 7, 5)};
     const Error size = error_of([&] { engine().prepare(rectangle_light(1, 1), o, OcclusionTexture{}); });
     EXPECT_EQ(size.code(), ErrorCode::invalid_input);
-    EXPECT_TRUE(holds(size.message(), "occluders.depth.layers[0]")) << size.what();
+    EXPECT_TRUE(holds(size.what(), "occluders.depth.layers[0]")) << size.what();
     const Error device = error_of([&] { engine().prepare(rectangle_light(1, 1), DeviceOccluders{}, OcclusionTexture{}); });
     EXPECT_EQ(device.code(), ErrorCode::unsupported);
     EXPECT_TRUE(holds(device.message(), "occlusion_texture") && holds(device.hint(), "depth maps in memory")) << device.what();
@@ -574,7 +574,7 @@ TEST(SlicesErrors, TooLargeForTheDeviceNamesWhatFits)
     OcclusionTexture s{.slices = 64, .resolution = 4096, .storage = LevelStorage::binary32};
     const Error error = error_of([&] { engine().mask(scene, s); });
     EXPECT_EQ(error.code(), ErrorCode::too_large);
-    EXPECT_TRUE(holds(error.message(), "64 slices of 4096 texels each way take") && holds(error.message(), "the device allows"))
+    EXPECT_TRUE(holds(error.what(), "64 slices of 4096 texels each way take") && holds(error.what(), "the device allows"))
         << error.what();
     int resolution = 0, slices = 0;
     ASSERT_EQ(std::sscanf(error.hint().c_str(), "a resolution of %d would fit, or %d slices", &resolution, &slices), 2) << error.hint();

@@ -428,7 +428,7 @@ TEST(Smoothie, RefusesAWidthThatTheLightDecides)
     const Scene scene = smoothie_scene(sphere_light(1), {half_plane(4)}, floor_at(8, size));
     const Error error = error_of([&] { engine().mask(scene, Smoothie{.t = 0.1}); });
     EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-    EXPECT_TRUE(holds(error.message(), "technique.t") && holds(error.message(), "t_from light")) << error.message();
+    EXPECT_TRUE(holds(error.what(), "technique.t") && holds(error.what(), "t_from light")) << error.message();
 }
 
 } // namespace

@@ -97,7 +97,7 @@ TEST(Table, EveryKeyRoundTripsAndRefusesTheRest)
             for (const SettingValue& value : examples.bad) {
                 const Error error = error_of([&] { technique_from({.kind = std::string(row.kind), .settings = {{name, value}}}); });
                 EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-                EXPECT_TRUE(holds(error.message(), "technique." + name + ": ")) << error.what();
+                EXPECT_TRUE(holds(error.what(), "technique." + name + ": ")) << error.what();
                 EXPECT_TRUE(holds(error.hint(), "expected ")) << error.what();
             }
         }
@@ -132,7 +132,7 @@ TEST(Table, UnknownNamesListTheKnown)
 {
     const Error kind = error_of([] { technique_from({.kind = "soft_shadow_mpa", .settings = {}}); });
     EXPECT_EQ(kind.code(), ErrorCode::invalid_input);
-    EXPECT_TRUE(holds(kind.message(), "technique.kind") && holds(kind.message(), "soft_shadow_mpa")) << kind.what();
+    EXPECT_TRUE(holds(kind.what(), "technique.kind") && holds(kind.what(), "soft_shadow_mpa")) << kind.what();
     EXPECT_TRUE(holds(kind.hint(), "shadow_map, soft_shadow_map, soft_shadow_volume, occlusion_texture, smoothie, ray_traced"))
         << kind.what();
     // Not built yet is unknown, like a typo (docs/scene_file.md, technique).
@@ -140,16 +140,16 @@ TEST(Table, UnknownNamesListTheKnown)
 
     const Error key = error_of([] { technique_from({.kind = "shadow_map", .settings = {{"sides", std::string("both")}}}); });
     EXPECT_EQ(key.code(), ErrorCode::invalid_input);
-    EXPECT_TRUE(holds(key.message(), "technique.sides: unknown key of shadow_map")) << key.what();
+    EXPECT_TRUE(holds(key.what(), "technique.sides: unknown key of shadow_map")) << key.what();
     EXPECT_TRUE(holds(key.hint(), "filter, taps, bias")) << key.what();
 }
 
 TEST(Table, MessagesHoldTheNumbers)
 {
     const Error range = error_of([] { technique_from({.kind = "shadow_map", .settings = {{"taps", std::int64_t{64}}}}); });
-    EXPECT_TRUE(holds(range.message(), "64") && holds(range.hint(), "from 1 to 63")) << range.what();
+    EXPECT_TRUE(holds(range.what(), "64") && holds(range.hint(), "from 1 to 63")) << range.what();
     const Error choice = error_of([] { technique_from({.kind = "shadow_map", .settings = {{"filter", std::string("pcf")}}}); });
-    EXPECT_TRUE(holds(choice.message(), "\"pcf\"") && holds(choice.hint(), "hard, percentage_closer, bicubic")) << choice.what();
+    EXPECT_TRUE(holds(choice.what(), "\"pcf\"") && holds(choice.hint(), "hard, percentage_closer, bicubic")) << choice.what();
 }
 
 TEST(Specialisations, EachOnceAndNamedByItsChoices)
