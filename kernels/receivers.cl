@@ -5,6 +5,23 @@
 #error "tile_bounds holds a row of a tile in a float16"
 #endif
 
+// A point of the camera's space in light space.
+inline void store_receiver(const ReceiverView view, const int at, const int there, const float px, const float py, const float z,
+                           __global float* restrict xi, __global float* restrict eta, __global float* restrict d)
+{
+    const float lx = fma(view.light_from_camera[0], px, fma(view.light_from_camera[1], py, fma(view.light_from_camera[2], z, view.light_from_camera[3])));
+    const float ly = fma(view.light_from_camera[4], px, fma(view.light_from_camera[5], py, fma(view.light_from_camera[6], z, view.light_from_camera[7])));
+    const float lz = fma(view.light_from_camera[8], px, fma(view.light_from_camera[9], py, fma(view.light_from_camera[10], z, view.light_from_camera[11])));
+    // Nearer than the least normal number counts as at the light: one over it would be beyond binary32.
+    const bool before = there && lz >= 0x1p-126f;
+
+    const float disparity = 1.0f / lz;
+    const float scale = view.light_orthographic ? 1.0f : disparity;
+    xi[at] = before ? lx * scale * view.per_light_x : 0.0f;
+    eta[at] = before ? ly * scale * view.per_light_y : 0.0f;
+    d[at] = before ? disparity : NO_RECEIVER;
+}
+
 // receivers_from_depth: one light-space point a pixel.
 //
 //   depth  [height][width]   planar depth from the receivers' camera, scene units; not finite or not positive: nothing there
@@ -24,20 +41,20 @@ __kernel void receivers_from_depth(const ReceiverView view, __global const float
     const float spread = view.camera_orthographic ? 1.0f : z;
     const float px = (2 * x + 1 - view.width) * view.pixel_x * spread;
     const float py = (view.height - 2 * y - 1) * view.pixel_y * spread;
+    store_receiver(view, y * view.stride + x, there, px, py, z, xi, eta, d);
+}
 
-    // The same point in light space.
-    const float lx = fma(view.light_from_camera[0], px, fma(view.light_from_camera[1], py, fma(view.light_from_camera[2], z, view.light_from_camera[3])));
-    const float ly = fma(view.light_from_camera[4], px, fma(view.light_from_camera[5], py, fma(view.light_from_camera[6], z, view.light_from_camera[7])));
-    const float lz = fma(view.light_from_camera[8], px, fma(view.light_from_camera[9], py, fma(view.light_from_camera[10], z, view.light_from_camera[11])));
-    // Nearer than the least normal number counts as at the light: one over it would be beyond binary32.
-    const bool before = there && lz >= 0x1p-126f;
-
-    const float disparity = 1.0f / lz;
-    const float scale = view.light_orthographic ? 1.0f : disparity;
-    const int at = y * view.stride + x;
-    xi[at] = before ? lx * scale * view.per_light_x : 0.0f;
-    eta[at] = before ? ly * scale * view.per_light_y : 0.0f;
-    d[at] = before ? disparity : NO_RECEIVER;
+// receivers_from_points: the same of points that are given, in the camera's coordinates.
+//
+//   points [height][width][3]  x right, y up, z along the view; z = 0: nothing there
+__kernel void receivers_from_points(const ReceiverView view, __global const float* restrict points, __global float* restrict xi,
+                                    __global float* restrict eta, __global float* restrict d)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= view.stride || y >= view.rows) return;
+    const float3 p = vload3(min(y, view.height - 1) * view.width + min(x, view.width - 1), points);
+    const bool there = x < view.width && y < view.height && p.z > 0.0f;
+    store_receiver(view, y * view.stride + x, there, p.x, p.y, p.z, xi, eta, d);
 }
 
 inline float least(const float16 v)

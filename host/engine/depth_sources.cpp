@@ -5,6 +5,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "depth_image/views.hpp"
 #include "engine/geometry.hpp"
 #include "scene/light_space.hpp"
 #include "scene/lights.hpp"
@@ -76,7 +77,35 @@ void check_size(const DepthMap& map, int width, int height, std::string_view whe
                         "expected " + std::to_string(width) + " x " + std::to_string(height));
 }
 
-Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs)
+namespace {
+
+DepthMap empty_view(int width, int height)
+{
+    return {.width = width, .height = height, .depth = std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), nothing_there)};
+}
+
+} // namespace
+
+Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
+               const std::shared_ptr<const opencl::Context>& context, bool with_images)
+{
+    const Geometry::State& state = geometry.state();
+    Views views{empty_view(width, height), empty_view(width, height)};
+    if (state.any_mesh(role)) {
+        const auto tracer = role == &Object::casts ? state.casters() : state.receivers();
+        if (front) views.front = tracer->front(camera, width, height);
+        if (back) views.back = tracer->back(camera, width, height);
+    }
+    if (!with_images) return views;
+    const auto images = state.images(role, context);
+    if (images.empty()) return views;
+    opencl::Work work(context ? context : opencl::Context::open({}));
+    for (const auto& image : images) add_view(work, *image, camera, views.front, views.back);
+    return views;
+}
+
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs,
+                               const std::shared_ptr<const opencl::Context>& context)
 {
     Occluders occluders = given;
     if (!needs.front && !needs.back) return occluders;
@@ -87,8 +116,11 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     if (render_front && !casters) missing("occluders.depth.front", "cast");
     if (render_back && !casters) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
     const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height);
-    if (render_front) occluders.front = geometry.state().casters()->front(camera, occluders.width, occluders.height);
-    if (render_back) occluders.back = geometry.state().casters()->back(camera, occluders.width, occluders.height);
+    if (render_front || render_back) {
+        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, context, !needs.depth_images);
+        if (render_front) occluders.front = std::move(views.front);
+        if (render_back) occluders.back = std::move(views.back);
+    }
     if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
     if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");
     occluders.camera = explicit_spec(LightCamera{}, camera);
@@ -97,17 +129,34 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
 
 Receivers with_depth(const Receivers& given, const Light& light, const Geometry& geometry)
 {
+    return receivers_with_depth(given, light, geometry, nullptr);
+}
+
+Receivers receivers_with_depth(const Receivers& given, const Light& light, const Geometry& geometry,
+                               const std::shared_ptr<const opencl::Context>& context)
+{
     Receivers receivers = given;
     check_pixels(receivers.width, receivers.height, "receivers.resolution");
     const Camera camera =
         resolve_camera(receivers.camera, light, geometry.objects(), receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {
         if (!geometry.state().any(&Object::receives)) missing("receivers.depth", "receive");
-        receivers.depth = geometry.state().receivers()->front(camera, receivers.width, receivers.height);
+        receivers.depth = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, context).front;
+        // What was seen of a depth image is as good as its planes.
+        receivers.depth->from_image = geometry.state().any_seen(&Object::receives);
     }
     check_size(*receivers.depth, receivers.width, receivers.height, "receivers.depth");
     receivers.camera = explicit_spec(receivers.camera, camera);
     return receivers;
+}
+
+std::shared_ptr<const DepthSurface> surface_of(const Receivers& receivers, const Camera& camera,
+                                               const std::shared_ptr<const opencl::Context>& context)
+{
+    if (!receivers.depth || !receivers.depth->from_image) return nullptr;
+    if (receivers.surface) return receivers.surface;
+    opencl::Work work(context ? context : opencl::Context::open({}));
+    return std::make_shared<const DepthSurface>(depth_surface(fit_depth(work, *receivers.depth, camera), camera));
 }
 
 Scene with_depth(const Scene& scene, const Technique& technique)
@@ -116,7 +165,7 @@ Scene with_depth(const Scene& scene, const Technique& technique)
     const Geometry geometry = view_of(scene);
     Scene result = scene;
     if (scene.lights.empty()) {
-        result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique));
+        result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique), nullptr);
         result.receivers = with_depth(scene.receivers, scene.light, geometry);
         return result;
     }
@@ -124,7 +173,7 @@ Scene with_depth(const Scene& scene, const Technique& technique)
         SceneLight& light = result.lights[i];
         const bool own = light.occluders.has_value();
         try {
-            light.occluders = occluders_with_depth(light.light, own ? *light.occluders : scene.occluders, geometry, needs_of(technique));
+            light.occluders = occluders_with_depth(light.light, own ? *light.occluders : scene.occluders, geometry, needs_of(technique), nullptr);
         } catch (const Error& error) {
             throw in_list(error, i, own);
         }

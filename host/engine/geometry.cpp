@@ -27,15 +27,47 @@ bool Geometry::State::any(bool Object::*role) const
     return std::any_of(objects->begin(), objects->end(), [role](const Object& object) { return object.*role; });
 }
 
+bool Geometry::State::any_seen(bool Object::*role) const
+{
+    return std::any_of(objects->begin(), objects->end(), [role](const Object& object) { return object.*role && object.seen; });
+}
+
+bool Geometry::State::any_mesh(bool Object::*role) const
+{
+    return std::any_of(objects->begin(), objects->end(), [role](const Object& object) { return object.*role && !object.seen; });
+}
+
+std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Object::*role,
+                                                                       const std::shared_ptr<const opencl::Context>& context) const
+{
+    const std::lock_guard lock(fitting_);
+    images_.resize(objects->size());
+    std::vector<std::shared_ptr<const DepthImage>> result;
+    for (std::size_t i = 0; i < objects->size(); ++i) {
+        const Object& object = (*objects)[i];
+        if (!(object.*role) || !object.seen) continue;
+        if (!images_[i]) {
+            const SeenSurface& seen = *object.seen;
+            opencl::Work work(context ? context : opencl::Context::open({}));
+            images_[i] = std::make_shared<const DepthImage>(depth_image(fit_depth(work, seen.depth, seen.camera), seen.camera, seen.thickness));
+        }
+        result.push_back(images_[i]);
+    }
+    return result;
+}
+
 std::uint64_t Geometry::State::bytes() const
 {
     std::uint64_t total = 0;
     for (const Object& object : *objects)
-        total += object.mesh.positions.size() * sizeof(Imath::V3f) + object.mesh.triangles.size() * sizeof(std::array<std::uint32_t, 3>);
+        total += (object.seen ? object.seen->depth.depth.size() * sizeof(float) : 0) + object.mesh.positions.size() * sizeof(Imath::V3f) + object.mesh.triangles.size() * sizeof(std::array<std::uint32_t, 3>);
     const std::lock_guard lock(building_);
     if (casters_) total += casters_->bytes();
     if (receivers_ && receivers_ != casters_) total += receivers_->bytes();
     if (topology_) total += topology_->bytes();
+    const std::lock_guard fitting(fitting_);
+    for (const auto& image : images_)
+        if (image) total += image->bytes();
     return total;
 }
 

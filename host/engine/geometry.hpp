@@ -7,6 +7,8 @@
 
 #include <penumbra/engine.hpp>
 
+#include "depth_image/depth_image.hpp"
+#include "opencl/context.hpp"
 #include "silhouette/silhouette.hpp"
 #include "trace/tracer.hpp"
 
@@ -25,6 +27,12 @@ struct Geometry::State {
     std::shared_ptr<const Tracer> casters() const { return tracer(&Object::casts, casters_); }
     std::shared_ptr<const Tracer> receivers() const { return tracer(&Object::receives, receivers_); }
 
+    // Depth images among the objects that cast, or that receive, fitted on the device of `context` (null: a device of the environment's
+    // choice). Each is fitted once.
+    std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
+    bool any_seen(bool Object::*role) const; // depth images among them
+    bool any_mesh(bool Object::*role) const; // triangles among them
+
     // How the triangles of the objects that cast hang together.
     std::shared_ptr<const Topology> topology() const;
 
@@ -38,6 +46,8 @@ private:
     mutable std::mutex building_;
     mutable std::shared_ptr<const Tracer> casters_, receivers_;
     mutable std::shared_ptr<const Topology> topology_;
+    mutable std::mutex fitting_;
+    mutable std::vector<std::shared_ptr<const DepthImage>> images_; // of each object; null: not fitted, or a mesh
 };
 
 // Where the first light of a scene is.

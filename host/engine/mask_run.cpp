@@ -98,13 +98,20 @@ private:
     }
 
     // The receivers with their depth; the first light renders it where it is missing.
-    const Receivers& receivers(const Light& light, std::vector<Stage>& stages)
+    const Receivers& receivers(const Light& light, const std::shared_ptr<const opencl::Context>& context, std::vector<Stage>& stages)
     {
         if (receivers_ || (receivers_ = keeper_.receivers())) return *receivers_;
         before("the receivers' depth");
         const Stopwatch watch;
-        receivers_ = std::make_shared<const Receivers>(with_depth(*job_.receivers, light, job_.geometry));
+        Receivers complete = receivers_with_depth(*job_.receivers, light, job_.geometry, context);
         stages.push_back({"render depth", watch.ms(), 0, 0});
+        if (complete.depth->from_image) {
+            const Stopwatch fitting;
+            const Camera camera = resolve_camera(complete.camera, light, {}, complete.width, complete.height, "receivers.camera");
+            complete.surface = surface_of(complete, camera, context);
+            stages.push_back({"fit depth", fitting.ms(), 0, 0});
+        }
+        receivers_ = std::make_shared<const Receivers>(std::move(complete));
         keeper_.keep(receivers_);
         return *receivers_;
     }
@@ -115,7 +122,7 @@ private:
         const Stopwatch total;
         const auto [made, kept] = prepared(index, frame);
         std::vector<Stage> stages;
-        const Receivers& seen = receivers(job_.lights[index].light, stages);
+        const Receivers& seen = receivers(job_.lights[index].light, made.state().context, stages);
         before("shading");
         Mask mask = engine_.shade(made, seen);
         Report& report = mask.report;

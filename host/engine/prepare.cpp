@@ -56,7 +56,9 @@ bool inside_view(const Imath::Box3d& box, const Camera& view)
 bool casters_inside(const std::vector<Object>& objects, const Camera& view)
 {
     for (const Object& object : objects) {
-        if (!object.casts || inside_view(bounds(object.mesh), view)) continue;
+        if (!object.casts) continue;
+        if (object.seen) return false; // its pixels are many, and counting receivers costs nothing
+        if (inside_view(bounds(object.mesh), view)) continue;
         for (const auto& triangle : object.mesh.triangles) {
             int before = 0, inside = 0;
             for (const std::uint32_t vertex : triangle) {
@@ -110,7 +112,7 @@ std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry)
 {
     std::vector<const TriangleMesh*> meshes;
     for (const Object& object : geometry.objects())
-        if (object.casts) meshes.push_back(&object.mesh);
+        if (object.casts && !object.seen) meshes.push_back(&object.mesh);
     return meshes;
 }
 
@@ -206,28 +208,41 @@ Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique) const
 {
     auto state = new_state(impl_->context, light, technique);
-    const Needs needs = needs_of(technique);
+    Needs needs = needs_of(technique);
+    const Geometry::State& objects = geometry.state();
+    check_casters(needs, objects.any(&Object::casts), given, kind_of(technique));
+    // Depth images that cast stand for themselves, or the light's view of everything stands for them and the meshes beside them.
+    const bool seen = objects.any_seen(&Object::casts);
+    const bool by_view = seen && !needs.depth_images, or_front = needs.casters == Needs::Casters::or_front;
+    if (by_view && or_front) needs.front = needs.back = true;
+    // Of a technique that traces images alone, meshes are what the light sees of them.
+    if (needs.depth_images && or_front) needs.front = objects.any_mesh(&Object::casts);
     const bool maps = needs.front || needs.back;
     Casting casting{.light = state->light,
                     .depth = {},
-                    .meshes = casting_meshes(geometry),
-                    .topology = [&] { return geometry.state().topology(); },
-                    .tracer = [&] { return geometry.state().casters(); }};
-    check_casters(needs, !casting.meshes.empty(), given, kind_of(technique));
+                    .meshes = by_view ? std::vector<const TriangleMesh*>{} : casting_meshes(geometry),
+                    .topology = [&] { return objects.topology(); },
+                    .tracer = [&] { return objects.casters(); },
+                    .images = {}};
+    if (seen && needs.depth_images) {
+        const Stopwatch watch;
+        casting.images = objects.images(&Object::casts, state->context);
+        state->stages.push_back({"fit depth", watch.ms(), 0, 0});
+    }
 
     // Render what the maps lack.
     Occluders complete;
     if (maps) {
         const Stopwatch watch;
-        complete = occluders_with_depth(light, given, geometry, needs);
+        complete = occluders_with_depth(light, given, geometry, needs, state->context);
         state->stages.push_back({"render depth", watch.ms(), 0, 0});
     }
-    const bool shown = casting.meshes.empty() && needs.casters == Needs::Casters::or_front;
+    const bool shown = casting.meshes.empty() && or_front && (by_view || casting.images.empty());
     if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, shown);
 
     prepare_technique(*state, casting);
     state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view));
-    if (needs.receivers_from_light && geometry.state().any(&Object::receives)) state->receiver_tracer = geometry.state().receivers();
+    if (needs.receivers_from_light && objects.any(&Object::receives)) state->receiver_geometry = geometry;
     return Prepared(state);
 }
 
@@ -268,7 +283,7 @@ Prepared Engine::prepare(const Light& light, const DeviceOccluders& occluders, c
                            .layers = {},
                            .device_front = taken(occluders.front, needs.front, "occluders.front"),
                            .device_back = taken(occluders.back, needs.back, "occluders.back")};
-    prepare_technique(*state, {.light = state->light, .depth = depth, .meshes = {}, .topology = {}, .tracer = {}});
+    prepare_technique(*state, {.light = state->light, .depth = depth, .meshes = {}, .topology = {}, .tracer = {}, .images = {}});
     return Prepared(state);
 }
 

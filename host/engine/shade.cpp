@@ -50,10 +50,10 @@ void make_grey(Image& image)
 // Depth of the receivers as the light sees them: from the objects that receive, else from the surfaces that the receivers' own depth shows.
 DepthMap light_view_depth(const Prepared::State& state, const Receivers& receivers, const Camera& camera, int resolution)
 {
-    if (state.receiver_tracer) return state.receiver_tracer->front(state.light_view, resolution, resolution);
-    const TriangleMesh mesh = mesh_from_depth(*receivers.depth, camera);
-    const TriangleMesh* const meshes[] = {&mesh};
-    return Tracer(meshes, state.light_view.frame.origin).front(state.light_view, resolution, resolution);
+    if (state.receiver_geometry)
+        return views_of(*state.receiver_geometry, &Object::receives, state.light_view, resolution, resolution, true, false, state.context).front;
+    const Object shown{.name = "receivers", .mesh = {}, .casts = false, .receives = true, .seen = SeenSurface{*receivers.depth, camera, 0}};
+    return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, true, false, state.context).front;
 }
 
 void warn_of_counts(const Prepared::State& state, const ShadeCounts& counts, Report& report)
@@ -94,6 +94,8 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
 
     const Stopwatch total;
+    const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.context);
+    const double fit_ms = total.ms();
     Mask mask{.visibility = {}, .report = report_of(state, receivers.width, receivers.height)};
     opencl::Work work(state.context);
     const Receiving receiving{.camera = camera,
@@ -101,6 +103,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
                               .height = receivers.height,
                               .depth = &*receivers.depth,
                               .device_depth = {},
+                              .surface = surface.get(),
                               .view = state.light_view,
                               .from_light = [&](int resolution) {
                                   check_pixels(resolution, resolution, "technique.project_resolution");
@@ -109,6 +112,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
                                   mask.report.stages.push_back({"render depth", render.ms(), 0, 0});
                                   return depth;
                               }};
+    if (surface && !receivers.surface) mask.report.stages.push_back({"fit depth", fit_ms, 0, 0});
     opencl::Buffer<float> visibility;
     if (!row_of(mask.report.technique).on_host)
         visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");
@@ -144,6 +148,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .height = receivers.height,
                               .depth = nullptr,
                               .device_depth = cl::Buffer(receivers.depth, true),
+                              .surface = nullptr,
                               .view = state.light_view,
                               .from_light = {}};
     Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr};

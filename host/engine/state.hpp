@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,7 @@ struct Prepared::State {
     Camera light_view;                             // that receivers come in; unused by rays
     int channels = 1;                              // of the visibility
     bool covered = false;                          // every caster is known to lie inside the occluder map
-    std::shared_ptr<const Tracer> receiver_tracer; // objects that receive, where the technique wants the light's view of them; may be null
+    std::optional<Geometry> receiver_geometry;     // with objects that receive, where the technique wants the light's view of them
     PreparedTechnique data;
 
     std::vector<Stage> stages;

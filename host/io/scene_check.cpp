@@ -42,6 +42,11 @@ struct Check {
         for (const JsonValue& element : elements) element.text();
     }
     void operator()(const Numbers& numbers) const { value.numbers(numbers.count); }
+    void operator()(const LengthOrAuto&) const
+    {
+        if (value.json().is_string() && value.json() == "auto") return;
+        if (!value.json().is_number() || !(value.number() > 0)) throw value.expected("a number above 0, or \"auto\"");
+    }
     void operator()(const Pair&) const { value.positive_pair(); }
     void operator()(const Size& size) const
     {

@@ -193,7 +193,7 @@ const Object& object()
           .meaning = "the surfaces that one camera sees",
           .keys = placed({{.name = "depth",
                            .type = File{},
-                           .meaning = "image of depth; neighbouring pixels are joined unless the depth jumps",
+                           .meaning = "image of depth; its surfaces are fitted and traced in the image itself",
                            .required = true,
                            .example = "\"view.exr\""},
                           {.name = "camera",
@@ -205,7 +205,13 @@ const Object& object()
                            .type = One{encoding},
                            .meaning = "how `depth` stores depth",
                            .fallback = R"({"kind": "planar"})",
-                           .example = R"({"kind": "radial"})"}})}}};
+                           .example = R"({"kind": "radial"})"},
+                          {.name = "thickness",
+                           .type = LengthOrAuto{},
+                           .meaning = "of the bodies behind the surfaces; `\"auto\"`: round or mirrored bodies, from their silhouettes",
+                           .unit = "length",
+                           .fallback = "\"auto\"",
+                           .example = "0.2"}})}}};
     return object;
 }
 

@@ -39,6 +39,7 @@ struct Files {  // a list of them
 struct Numbers { // a vector or matrix of that many
     std::size_t count;
 };
+struct LengthOrAuto {}; // a number above 0, or "auto"
 struct Pair {}; // [x, y], or one number for both; above 0
 struct Size {   // [width, height]
     std::int64_t low, high;
@@ -52,7 +53,7 @@ struct List { // of objects
 };
 struct TechniqueKeys {}; // a kind of technique_table() and its settings
 
-using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, Pair, Size, One, List, TechniqueKeys>;
+using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, LengthOrAuto, Pair, Size, One, List, TechniqueKeys>;
 
 // --- Keys, forms, objects --------------------------------------------------------------------------------------------------------
 

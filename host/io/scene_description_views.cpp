@@ -108,6 +108,11 @@ std::vector<Key> stored(std::vector<Key> keys)
                     .meaning = "the stored value that means nothing there",
                     .otherwise = "what is not finite, not positive, or at least 1e9 (in a half-float image 65504)",
                     .example = "0"});
+    keys.push_back({.name = "precision",
+                    .type = Number{.low = 0, .high = 1, .above_low = true},
+                    .meaning = "standard error of a depth over the depth: the image's noise",
+                    .otherwise = "estimated from the image, and reported",
+                    .example = "0.001"});
     keys.push_back({.name = "channel",
                     .type = Text{},
                     .meaning = "the image's channel",

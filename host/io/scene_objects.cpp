@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -47,37 +48,73 @@ TriangleMesh read_mesh_file(const JsonValue& name, const Resources& resources)
     });
 }
 
-TriangleMesh read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
+SeenSurface read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
                                 std::vector<std::string>& warnings)
 {
     const JsonValue name = section.need("depth");
     const JsonValue place = section.need("camera");
     const CameraSpec spec = parse_camera(place, light);
     const auto given = section.find("encoding");
-    const DepthMap map = load_depth(name, given ? parse_encoding(*given) : MapEncoding{}, spec, resources, warnings);
+    DepthMap map = load_depth(name, given ? parse_encoding(*given) : MapEncoding{}, spec, resources, warnings);
     // There is nothing that a light's camera could be fitted to: this depth image is the object.
-    TriangleMesh mesh = mesh_from_depth(map, resolve_camera(spec, light, {}, map.width, map.height, place.key()));
-    if (mesh.triangles.empty()) warnings.push_back(name.key() + ": " + name.text() + " shows no surface");
-    return mesh;
+    const Camera camera = resolve_camera(spec, light, {}, map.width, map.height, place.key());
+    if (std::none_of(map.depth.begin(), map.depth.end(), [](float depth) { return std::isfinite(depth); }))
+        warnings.push_back(name.key() + ": " + name.text() + " shows no surface");
+    const auto thickness = section.find("thickness");
+    const bool given_thickness = thickness && thickness->json().is_number();
+    return {.depth = std::move(map), .camera = camera, .thickness = given_thickness ? thickness->number() : 0};
 }
 
 // Scale, then rotations about X, Y and Z, then translation.
-void place(TriangleMesh& mesh, const JsonObject& section)
+struct Placement {
+    double scale;
+    Vec3 cosine, sine, translation;
+
+    Vec3 turned(Vec3 p) const
+    {
+        p = {p.x, cosine.x * p.y - sine.x * p.z, sine.x * p.y + cosine.x * p.z};
+        p = {cosine.y * p.x + sine.y * p.z, p.y, cosine.y * p.z - sine.y * p.x};
+        return {cosine.z * p.x - sine.z * p.y, sine.z * p.x + cosine.z * p.y, p.z};
+    }
+    Vec3 placed(const Vec3& p) const { return turned(p * scale) + translation; }
+};
+
+Placement placement_of(const JsonObject& section)
 {
     const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
-    const double s = scale ? scale->number() : 1;
     const Vec3 r = rotate ? rotate->vec3() * (std::numbers::pi / 180) : Vec3(0, 0, 0);
-    const Vec3 t = translate ? translate->vec3() : Vec3(0, 0, 0);
-    const Vec3 c(std::cos(r.x), std::cos(r.y), std::cos(r.z)), n(std::sin(r.x), std::sin(r.y), std::sin(r.z));
+    return {.scale = scale ? scale->number() : 1,
+            .cosine = {std::cos(r.x), std::cos(r.y), std::cos(r.z)},
+            .sine = {std::sin(r.x), std::sin(r.y), std::sin(r.z)},
+            .translation = translate ? translate->vec3() : Vec3(0, 0, 0)};
+}
+
+void place(TriangleMesh& mesh, const JsonObject& section)
+{
+    const Placement placement = placement_of(section);
     for (Imath::V3f& position : mesh.positions) {
-        Vec3 p = Vec3(position) * s;
-        p = {p.x, c.x * p.y - n.x * p.z, n.x * p.y + c.x * p.z};
-        p = {c.y * p.x + n.y * p.z, p.y, c.y * p.z - n.y * p.x};
-        p = {c.z * p.x - n.z * p.y, n.z * p.x + c.z * p.y, p.z};
-        position = Imath::V3f(p + t);
+        position = Imath::V3f(placement.placed(Vec3(position)));
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
             throw section.value().error("has positions beyond float32", "scale and translate are too large");
     }
+}
+
+// The camera moves with its surfaces; its depth and their thickness grow with the scale.
+void place(SeenSurface& seen, const JsonObject& section)
+{
+    const Placement placement = placement_of(section);
+    Frame& frame = seen.camera.frame;
+    frame = {.origin = placement.placed(frame.origin), .x = placement.turned(frame.x), .y = placement.turned(frame.y), .z = placement.turned(frame.z)};
+    if (placement.scale == 1) return;
+    const auto scale = static_cast<float>(placement.scale);
+    for (float& depth : seen.depth.depth) {
+        depth *= scale;
+        if (!(depth > 0)) throw section.value().error("has depths that scale makes 0", "scale is too small");
+    }
+    if (seen.camera.orthographic) seen.camera.half_extent *= placement.scale;
+    seen.depth.step.depth *= placement.scale;
+    seen.depth.step.disparity /= placement.scale;
+    seen.depth.step.unit *= placement.scale;
 }
 
 } // namespace
@@ -96,12 +133,13 @@ penumbra::Object parse_object(const JsonValue& value, const Light& light, const 
     if (const auto receives = section.find("receives")) object.receives = receives->flag();
     if (section.has("depth")) {
         object.name = section.need("depth").text();
-        object.mesh = read_depth_surface(section, light, resources, warnings);
+        object.seen = read_depth_surface(section, light, resources, warnings);
+        place(*object.seen, section);
     } else {
         object.name = section.has("mesh") ? section.need("mesh").text() : "quad";
         object.mesh = section.has("mesh") ? read_mesh_file(section.need("mesh"), resources) : read_quad(section.need("quad"));
+        place(object.mesh, section);
     }
-    place(object.mesh, section);
     return object;
 }
 

@@ -66,6 +66,10 @@ struct TypeSchema {
         return files.or_one ? Json{{"anyOf", {(*this)(File{}), list}}} : list;
     }
     Json operator()(const Numbers& numbers) const { return array_of((*this)(Number{}), numbers.count, numbers.count); }
+    Json operator()(const LengthOrAuto&) const
+    {
+        return {{"anyOf", {(*this)(Number{.low = 0, .above_low = true}), Json{{"const", "auto"}}}}};
+    }
     Json operator()(const Pair&) const
     {
         const Json above = (*this)(Number{.low = 0, .above_low = true});

@@ -54,6 +54,7 @@ struct TypeWords {
     {
         return numbers.count == 3 ? "`[x, y, z]`" : std::to_string(numbers.count) + " numbers";
     }
+    std::string operator()(const LengthOrAuto&) const { return "above 0, or `\"auto\"`"; }
     std::string operator()(const Pair&) const { return "`[x, y]` or one number, above 0"; }
     std::string operator()(const Size& size) const
     {

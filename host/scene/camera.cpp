@@ -16,11 +16,39 @@ struct LightBox {
     std::string crosses; // the first object with a triangle through the light's plane; empty: none
 };
 
+// What of an image's pixels is fitted to: all but the outermost half a per cent each way, where stray pixels lie.
+constexpr double fitted_share = .995;
+
+// The same of a depth image's pixels. What lies behind the light's plane or all but in it is left out: what is not on the map casts no shadow,
+// and shading counts who sees past its border.
+void add_seen(LightBox& result, const LightFrame& light, const SeenSurface& seen)
+{
+    std::vector<double> x, y;
+    for (int row = 0; row < seen.depth.height; ++row)
+        for (int column = 0; column < seen.depth.width; ++column) {
+            const double depth = seen.depth.at(column, row);
+            if (!std::isfinite(depth) || !(depth > 0)) continue;
+            const Vec3 p = light_from_world(light, world_point(seen.camera, seen.depth.width, seen.depth.height, column + .5, row + .5, depth));
+            result.box.extendBy(p);
+            if (!(p.z > 0)) continue;
+            x.push_back(std::abs(p.x / p.z));
+            y.push_back(std::abs(p.y / p.z));
+        }
+    if (x.empty()) return;
+    const auto quantile = [](std::vector<double>& v) {
+        const auto at = v.begin() + static_cast<std::ptrdiff_t>(fitted_share * static_cast<double>(v.size() - 1));
+        std::nth_element(v.begin(), at, v.end());
+        return *at;
+    };
+    result.tangent = {std::max(result.tangent.x, quantile(x)), std::max(result.tangent.y, quantile(y))};
+}
+
 LightBox light_box(const LightFrame& light, const std::vector<Object>& objects)
 {
     LightBox result;
     for (const Object& object : objects) {
         if (!object.casts && !object.receives) continue;
+        if (object.seen) add_seen(result, light, *object.seen);
         for (const auto& triangle : object.mesh.triangles) {
             Vec3 corner[3];
             int before = 0;

@@ -94,6 +94,45 @@ double precision_of(const RawDepth& raw, const DepthEncoding& encoding)
 
 } // namespace
 
+namespace {
+
+// How far apart the depths of neighbouring stored numbers are.
+DepthStep step_of(const RawDepth& raw, const DepthEncoding& encoding)
+{
+    DepthStep step;
+    const double scale = std::abs(encoding.scale);
+    if (raw.type == SampleType::float16) {
+        step.mantissa_bits = 10;
+        step.unit = encoding.kind == EncodingKind::planar ? scale : 1;
+    }
+    if (!is_integer(raw.type)) return step;
+    const double unit = in_unit_range(encoding.kind) ? 1 / largest_integer(raw.type) : 1;
+    const double inverse_far = encoding.far ? 1 / *encoding.far : 0;
+    switch (encoding.kind) {
+    case EncodingKind::planar:
+    case EncodingKind::radial: step.depth = unit * scale; break;
+    case EncodingKind::normalized: step.depth = unit * scale * std::abs(*encoding.far - *encoding.near); break;
+    case EncodingKind::disparity: step.disparity = unit / scale; break;
+    case EncodingKind::window:
+    case EncodingKind::reversed_window: step.disparity = unit * std::abs(1 / *encoding.near - inverse_far) / scale; break;
+    }
+    return step;
+}
+
+// What the map says of itself beside its depths.
+DepthMap map_of(const RawDepth& raw, const DepthEncoding& encoding, double precision)
+{
+    return {.width = raw.width,
+            .height = raw.height,
+            .depth = {},
+            .precision = precision,
+            .from_image = true,
+            .noise = encoding.precision.value_or(0),
+            .step = step_of(raw, encoding)};
+}
+
+} // namespace
+
 DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings)
 {
@@ -105,15 +144,16 @@ DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& h
 
     // Planar depth is what is wanted: nothing but what means nothing there is replaced. As is_empty says, for every sample at once.
     if (encoding.kind == EncodingKind::planar && encoding.scale == 1 && !encoding.empty) {
-        const double precision = precision_of(raw, encoding);
+        DepthMap map = map_of(raw, encoding, precision_of(raw, encoding));
         const float end = is_integer(raw.type)              ? std::numeric_limits<float>::infinity()
                           : raw.type == SampleType::float16 ? half_far_away
                                                             : far_away;
         for (float& stored : raw.samples) stored = stored > 0 && stored < end ? stored : nothing_there;
-        return {.width = raw.width, .height = raw.height, .depth = std::move(raw.samples), .precision = precision};
+        map.depth = std::move(raw.samples);
+        return map;
     }
 
-    DepthMap map{.width = raw.width, .height = raw.height, .depth = {}, .precision = precision_of(raw, encoding)};
+    DepthMap map = map_of(raw, encoding, precision_of(raw, encoding));
     map.depth.reserve(raw.samples.size());
     std::size_t on_far_plane = 0;
     for (std::size_t i = 0; i < raw.samples.size(); ++i) {

@@ -1,4 +1,4 @@
-// Depth images: decoding, and surfaces made from them.
+// Depth images: decoding.
 #pragma once
 
 #include <optional>
@@ -16,6 +16,7 @@ struct DepthEncoding {
     std::optional<double> near, far;
     double scale = 1; // multiplies the decoded depth
     std::optional<double> empty;
+    std::optional<double> precision; // standard error of a depth over the depth; without it, estimated from the image
 };
 
 // The stored samples of one channel as float32. Integers come as stored (0 to 255, 0 to 65535), not divided.
@@ -31,13 +32,5 @@ struct RawDepth {
 // memory.
 DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings);
-
-// The surfaces that a camera sees: neighbouring pixel centres joined by triangles, but not across a depth jump: where disparity steps by
-// more than the neighbouring slopes explain. Triangles face the camera.
-TriangleMesh mesh_from_depth(const DepthMap& depth, const Camera& camera);
-
-// Whether two neighbouring texels a, b lie on one surface, from four disparities in a row (0: nothing there) that are right to the relative
-// `precision`. A plane's disparity is linear across the image, so the step from a to b must be one that the slope on either side explains.
-bool connected(double before, double a, double b, double after, double precision);
 
 } // namespace penumbra

@@ -24,12 +24,12 @@ TechniqueRow row(const RayTraced&)
             .defaults = RayTraced{}};
 }
 
-Needs needs(const RayTraced&) { return {.casters = Needs::Casters::required}; }
+Needs needs(const RayTraced&) { return {.casters = Needs::Casters::required, .depth_images = true}; }
 
 PreparedRays prepare(opencl::Work& work, const Casting& casting, const RayTraced& settings, Findings& findings)
 {
     work.stage("prepare");
-    PreparedRays prepared{.settings = settings, .light = casting.light, .casters = casting.tracer()};
+    PreparedRays prepared{.settings = settings, .light = casting.light, .casters = casting.tracer(), .images = casting.images};
     work.moved(prepared.casters->bytes());
     if (prepared.casters->degenerate_count() > 0)
         findings.warnings.push_back(std::to_string(prepared.casters->degenerate_count()) + " triangles without area were left out");
@@ -43,7 +43,8 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
                                                {.samples = prepared.settings.samples,
                                                 .adaptive = prepared.settings.adaptive,
                                                 .first_samples = prepared.settings.first_samples,
-                                                .seed = static_cast<std::uint64_t>(prepared.settings.seed)});
+                                                .seed = static_cast<std::uint64_t>(prepared.settings.seed)},
+                                               {.images = prepared.images, .surface = receivers.surface});
     shaded.image = std::move(result.visibility);
     if (shaded.counts) shaded.counts->pairs = result.rays;
 }
@@ -65,7 +66,7 @@ DeviceBuffers device_buffers(const RayTraced&)
 PreparedRays with_emission(opencl::Work& work, const PreparedRays& prepared, const Light& light)
 {
     work.stage("prepare");
-    return {.settings = prepared.settings, .light = light, .casters = prepared.casters};
+    return {.settings = prepared.settings, .light = light, .casters = prepared.casters, .images = prepared.images};
 }
 
 } // namespace penumbra

@@ -14,6 +14,7 @@ struct PreparedRays {
     RayTraced settings;
     Light light;
     std::shared_ptr<const Tracer> casters;
+    std::vector<std::shared_ptr<const DepthImage>> images;
 };
 
 // The verbs (verbs.hpp).

@@ -39,17 +39,35 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
     return view;
 }
 
+namespace {
+
+ReceiverPoints room_for_points(opencl::Work& work, const ReceiverView& view, double precision)
+{
+    const std::size_t count = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.rows);
+    return {.view = view,
+            .precision = precision,
+            .xi = work.buffer<float>(count, "receivers' xi"),
+            .eta = work.buffer<float>(count, "receivers' eta"),
+            .d = work.buffer<float>(count, "receivers' disparity")};
+}
+
+} // namespace
+
+ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& lifted, double precision,
+                                      const opencl::Specialisation& program)
+{
+    ReceiverPoints points = room_for_points(work, view, precision);
+    work.launch(program, "receivers_from_points", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
+                points.d.bytes() * 6, view, lifted, points.xi, points.eta, points.d);
+    return points;
+}
+
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
                                const opencl::Specialisation& program)
 {
-    const std::size_t count = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.rows);
-    ReceiverPoints points{.view = view,
-                          .precision = precision,
-                          .xi = work.buffer<float>(count, "receivers' xi"),
-                          .eta = work.buffer<float>(count, "receivers' eta"),
-                          .d = work.buffer<float>(count, "receivers' disparity")};
+    ReceiverPoints points = room_for_points(work, view, precision);
     work.launch(program, "receivers_from_depth", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
-                count * 16, view, depth, points.xi, points.eta, points.d);
+                points.d.bytes() * 4, view, depth, points.xi, points.eta, points.d);
     return points;
 }
 

@@ -3,6 +3,7 @@
 
 #include <penumbra/scene.hpp>
 
+#include "common/depth_walk.h"
 #include "common/shared.h"
 #include "opencl/work.hpp"
 
@@ -28,5 +29,9 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
 // Launches receivers_from_depth on a depth map that is on the device. `program`: one that has the kernel.
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
                                const opencl::Specialisation& program = receivers_program());
+
+// The same of points in the camera's coordinates, [view.height][view.width]; z = 0: no receiver.
+ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& points, double precision,
+                                      const opencl::Specialisation& program = receivers_program());
 
 } // namespace penumbra

@@ -1,6 +1,7 @@
 // Every program that can be asked for, found by walking the techniques' own keys.
 #include <set>
 
+#include "depth_image/views.hpp"
 #include "technique/occluder_maps.hpp"
 #include "technique/techniques.hpp"
 
@@ -42,6 +43,8 @@ std::vector<opencl::Specialisation> every_specialisation()
     const auto add = [&](const opencl::Specialisation& program) {
         if (known.insert(program.file + ' ' + program.options()).second) all.push_back(program);
     };
+    add(depth_fit_program());
+    add(depth_trace_program());
     add(receivers_program());
     add(occluders_program());
     for (const TechniqueRow& row : technique_table()) {

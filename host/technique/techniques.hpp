@@ -4,6 +4,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "technique/depth_trace.hpp"
 #include "technique/occlusion_texture.hpp"
 #include "technique/ray_traced.hpp"
 #include "technique/shadow_map.hpp"

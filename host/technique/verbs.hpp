@@ -31,6 +31,7 @@
 #include <penumbra/mask_job.hpp>
 #include <penumbra/scene.hpp>
 
+#include "depth_image/depth_image.hpp"
 #include "opencl/work.hpp"
 #include "scene/camera.hpp"
 #include "silhouette/silhouette.hpp"
@@ -46,6 +47,8 @@ struct Needs {
     // Objects that cast. or_front: without any, the maps that the scene has do, of which front must be one.
     enum class Casters { unused, or_front, required };
     Casters casters = Casters::unused;
+    // Casting::images: depth images that cast are traced as they are. Techniques that do not want them get the light's view of them instead.
+    bool depth_images = false;
     // Receiving::from_light: what the light sees of the receivers.
     bool receivers_from_light = false;
 };
@@ -67,6 +70,8 @@ struct Casting {
     // How those triangles hang together, and a hierarchy of them for rays: built by whoever asks first, kept with the scene's geometry.
     std::function<std::shared_ptr<const Topology>()> topology;
     std::function<std::shared_ptr<const Tracer>()> tracer;
+    // The depth images among the objects that cast, fitted (Needs::depth_images).
+    std::vector<std::shared_ptr<const DepthImage>> images;
 };
 
 // What prepare has to say beside its state.
@@ -82,6 +87,7 @@ struct Receiving {
     int width = 0, height = 0;
     const DepthMap* depth = nullptr;
     cl::Buffer device_depth; // where there is no `depth`
+    const DepthSurface* surface = nullptr; // what was fitted to `depth`, where it is somebody else's: lifted points and their normals
     const Camera& view;      // Findings::view
     // Depth of the receivers in that view, resolution x resolution. Empty unless Needs asked for it.
     std::function<DepthMap(int resolution)> from_light;

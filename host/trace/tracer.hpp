@@ -9,6 +9,7 @@
 
 #include <penumbra/scene.hpp>
 
+#include "depth_image/depth_image.hpp"
 #include "scene/camera.hpp"
 #include "scene/light_space.hpp"
 
@@ -48,6 +49,12 @@ struct VisibilityOptions {
     std::uint64_t seed = 1;
 };
 
+// What shadow rays meet beside the tracer's triangles, and where they start.
+struct SeenScene {
+    std::span<const std::shared_ptr<const DepthImage>> images; // walked with the same samples
+    const DepthSurface* surface = nullptr;                     // receivers of somebody else's depth: lifted, the light clipped at their planes
+};
+
 struct VisibilityResult {
     Image visibility;       // 1 channel, or 3 for a textured light
     std::uint64_t rays = 0; // shadow rays cast
@@ -57,6 +64,6 @@ struct VisibilityResult {
 // Deterministic for a seed, whatever the thread count. A receiver that lies on one of the tracer's triangles is on the camera's side of it
 // (surface.hpp). A textured light shines evenly within each texel. Throws usage for sample counts below 1 and maps whose size does not fit.
 VisibilityResult trace_visibility(const Tracer& tracer, const Light& light, const DepthMap& receivers, const Camera& camera,
-                                  const VisibilityOptions& options);
+                                  const VisibilityOptions& options, const SeenScene& seen = {});
 
 } // namespace penumbra

@@ -68,6 +68,14 @@ struct TracedLight {
 struct Receiver {
     bool sees_light = false; // false: nothing there, or behind the light's plane
     Vec3 point;              // traced space
+    std::size_t pixel = 0;
+    Vec3 normal{0, 0, 0}; // world space; 0: the light is not clipped
+};
+
+// A depth image among the casters, and the light as its camera sees it.
+struct WalkedImage {
+    const DepthImage* image;
+    Vec3 centre, half_u, half_v; // image camera's coordinates; the direction to a directional light
 };
 
 // What one receiver's rays met.
@@ -78,12 +86,30 @@ struct Tally {
     bool agree() const { return free == 0 || free == rays; }
 };
 
+// Two axes of length `radius` perpendicular to `axis`.
+void disc_axes(const Vec3& axis, double radius, Vec3& half_u, Vec3& half_v)
+{
+    const Vec3 size(std::abs(axis.x), std::abs(axis.y), std::abs(axis.z));
+    const Vec3 other = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0) : size.y <= size.z ? Vec3(0, 1, 0) : Vec3(0, 0, 1);
+    const Vec3 u = axis.cross(other).normalized();
+    half_u = u * radius;
+    half_v = axis.cross(u).normalized() * radius;
+}
+
 class Visibility {
 public:
     Visibility(const Tracer::Impl& scene, const TracedLight& light, const DepthMap& receivers, const Camera& camera,
-               const VisibilityOptions& options)
-        : scene_(scene), light_(light), receivers_(receivers), camera_(camera), options_(options)
+               const VisibilityOptions& options, const SeenScene& seen)
+        : scene_(scene), light_(light), receivers_(receivers), camera_(camera), options_(options), seen_(seen)
     {
+        for (const auto& image : seen.images) {
+            const Camera& to = image->camera;
+            const LightFrame& frame = light.frame;
+            images_.push_back({.image = image.get(),
+                               .centre = frame.directional ? direction_from_world(to, -frame.direction) : camera_from_world(to, frame.origin),
+                               .half_u = direction_from_world(to, frame.u * frame.half_u),
+                               .half_v = direction_from_world(to, frame.v * frame.half_v)});
+        }
         result_.visibility = {.width = receivers.width, .height = receivers.height, .channels = light.emission ? 3 : 1, .pixels = {}};
         result_.visibility.pixels.assign(result_.visibility.pixel_count() * static_cast<std::size_t>(result_.visibility.channels), 1.f);
     }
@@ -165,6 +191,7 @@ private:
 
     Receiver receiver_at(int x, int y, NearSurfaces& scratch) const
     {
+        if (seen_.surface) return lifted_receiver(x, y);
         const double depth = receivers_.at(x, y);
         if (!std::isfinite(depth) || !(depth > 0)) return {};
         const Vec3 world = world_point(camera_, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth);
@@ -173,7 +200,50 @@ private:
         // Depth has been rounded to float32, and as often again by at most three operations that decoded it.
         const Vec3 ray = camera_.orthographic ? -camera_.frame.z * depth : world - camera_.frame.origin;
         const double depth_error = 4 * float_rounding * ray.length() * scene_.scale;
-        return {true, before_surfaces(scene_, scene_.traced_from_world(world), ray.normalized(), depth_error, scratch)};
+        return {.sees_light = true,
+                .point = before_surfaces(scene_, scene_.traced_from_world(world), ray.normalized(), depth_error, scratch),
+                .pixel = pixel_index(x, y)};
+    }
+
+    std::size_t pixel_index(int x, int y) const
+    {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(receivers_.width) + static_cast<std::size_t>(x);
+    }
+
+    Receiver lifted_receiver(int x, int y) const
+    {
+        const std::size_t i = pixel_index(x, y);
+        const DepthVector& p = seen_.surface->points[i];
+        const DepthVector& n = seen_.surface->normals[i];
+        if (!(p.z > 0)) return {};
+        const Vec3 world = world_from_camera(camera_, Vec3(p.x, p.y, p.z));
+        if (!light_.frame.directional && light_from_world(light_.frame, world).z <= 0) return {};
+        return {.sees_light = true,
+                .point = scene_.traced_from_world(world),
+                .pixel = i,
+                .normal = world_from_camera(camera_, Vec3(n.x, n.y, n.z)) - camera_.frame.origin};
+    }
+
+    // Marks the rays of a packet that an image blocks.
+    void walk(const Receiver& receiver, const float (&x)[packet], const float (&y)[packet], const int (&valid)[packet], float (&tfar)[packet]) const
+    {
+        const Vec3 world = receiver.point / scene_.scale + scene_.origin;
+        for (const WalkedImage& walked : images_) {
+            const DepthImage& image = *walked.image;
+            const Vec3 start = camera_from_world(image.camera, world);
+            Vec3 centre = walked.centre, half_u = walked.half_u, half_v = walked.half_v;
+            if (!light_.frame.directional) centre -= start;
+            if (light_.sphere && !light_.coincident()) disc_axes(centre.normalized(), half_u.length(), half_u, half_v);
+            const DepthVector from{static_cast<float>(start.x), static_cast<float>(start.y), static_cast<float>(start.z)};
+            for (int i = 0; i < packet; ++i) {
+                if (!valid[i] || tfar[i] < 0) continue;
+                const Vec3 way = centre + half_u * static_cast<double>(x[i]) + half_v * static_cast<double>(y[i]);
+                const DepthVector along{static_cast<float>(way.x), static_cast<float>(way.y), static_cast<float>(way.z)};
+                const DepthLine line = depth_line(image.view, from, along, light_.frame.directional, DEPTH_OWN_PIXELS);
+                if (depth_walk(image.view, image.pixels.data(), image.nearest.data(), DEPTH_LEVELS, line, 0, 0).blocked)
+                    tfar[i] = -std::numeric_limits<float>::infinity();
+            }
+        }
     }
 
     Tally cast(const Receiver& receiver, const Strata& strata, SampleKey key) const;
@@ -184,19 +254,11 @@ private:
     const DepthMap& receivers_;
     const Camera& camera_;
     const VisibilityOptions& options_;
+    const SeenScene& seen_;
+    std::vector<WalkedImage> images_;
     VisibilityResult result_;
     std::atomic<std::uint64_t> rays_{0};
 };
-
-// Two axes of length `radius` perpendicular to `axis`.
-void disc_axes(const Vec3& axis, double radius, Vec3& half_u, Vec3& half_v)
-{
-    const Vec3 size(std::abs(axis.x), std::abs(axis.y), std::abs(axis.z));
-    const Vec3 other = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0) : size.y <= size.z ? Vec3(0, 1, 0) : Vec3(0, 0, 1);
-    const Vec3 u = axis.cross(other).normalized();
-    half_u = u * radius;
-    half_v = axis.cross(u).normalized() * radius;
-}
 
 Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey key) const
 {
@@ -208,6 +270,8 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
     const Imath::V3f c(to_center), u(half_u), v(half_v);
     const float end = light_.frame.directional ? std::numeric_limits<float>::infinity() : 1.f;
 
+    const Imath::V3f n(receiver.normal);
+    const bool clipped = receiver.normal != Vec3(0, 0, 0);
     alignas(64) RTCRay16 rays;
     alignas(64) int valid[packet];
     for (int i = 0; i < packet; ++i) {
@@ -242,7 +306,15 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
             rays.tfar[i] = end;
             valid[i] = first + i < strata.count ? -1 : 0;
         }
-        rtcOccluded16(valid, scene_.scene, &context, &rays);
+        // Below the receiver's own plane nothing shines.
+        int cast[packet];
+        for (int i = 0; i < packet; ++i) {
+            const bool below = clipped && rays.dir_x[i] * n.x + rays.dir_y[i] * n.y + rays.dir_z[i] * n.z <= 0;
+            cast[i] = below ? 0 : valid[i];
+            if (below) rays.tfar[i] = -std::numeric_limits<float>::infinity();
+        }
+        if (!scene_.triangles.empty()) rtcOccluded16(cast, scene_.scene, &context, &rays);
+        if (!images_.empty()) walk(receiver, x, y, cast, rays.tfar);
 
         // Embree marks a blocked ray with tfar = -infinity.
         for (int i = 0; i < packet; ++i) tally.free += valid[i] != 0 && rays.tfar[i] >= 0;
@@ -286,7 +358,7 @@ void require(const VisibilityOptions& options, const DepthMap& receivers)
 } // namespace
 
 VisibilityResult trace_visibility(const Tracer& tracer, const Light& light, const DepthMap& receivers, const Camera& camera,
-                                  const VisibilityOptions& options)
+                                  const VisibilityOptions& options, const SeenScene& seen)
 {
     require(options, receivers);
     const Tracer::Impl& scene = tracer.impl();
@@ -302,7 +374,7 @@ VisibilityResult trace_visibility(const Tracer& tracer, const Light& light, cons
     std::optional<Emission> emission;
     const auto* rectangle = std::get_if<RectangleLight>(&light);
     if (rectangle && rectangle->emission) traced.emission = &emission.emplace(*rectangle->emission);
-    return Visibility(scene, traced, receivers, camera, options).trace();
+    return Visibility(scene, traced, receivers, camera, options, seen).trace();
 }
 
 } // namespace penumbra

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -63,12 +64,25 @@ using Light = std::variant<RectangleLight, SphereLight, PointLight, DirectionalL
 
 constexpr float nothing_there = std::numeric_limits<float>::infinity();
 
+// How far apart neighbouring stored numbers of a depth image are; 0: no such step.
+struct DepthStep {
+    double depth = 0;      // in depth, the same everywhere: integers that count depth
+    double disparity = 0;  // in 1/depth, the same everywhere: integers of a depth buffer, of stereo
+    int mantissa_bits = 0; // floating point with so many bits after the point, of depth / unit: 10 for half floats
+    double unit = 1;
+};
+
 // Planar depth (distance along the viewing axis, positive, scene units), row 0 at the top; `nothing_there` where there is nothing.
 struct DepthMap {
     int width = 0;
     int height = 0;
     std::vector<float> depth;
     double precision = 0x1p-24; // largest relative rounding error of a depth: of float32, or of what it was decoded from
+    // From an image that somebody else may have made: each pixel's surface is fitted before it is used (docs/depth.md), with what is known of
+    // the image's own error. Else depth is exact: of the surface through each pixel's centre, right to `precision`, as an Engine renders it.
+    bool from_image = false;
+    double noise = 0; // standard error of a depth over the depth; 0: estimated from the image
+    DepthStep step = {};
 
     float& at(int x, int y) { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
     float at(int x, int y) const
@@ -110,6 +124,8 @@ struct PinholeCamera {
 
 using CameraSpec = std::variant<LightCamera, PinholeCamera>;
 
+struct DepthSurface; // of an Engine
+
 // --- What casts and what receives ----------------------------------------------------------------------------------------------
 
 // Triangles in world space; three indices a triangle, counter-clockwise seen from outside.
@@ -118,11 +134,19 @@ struct TriangleMesh {
     std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+// The surfaces that one camera sees: its depth image, fitted and traced in the image itself (docs/depth.md).
+struct SeenSurface {
+    DepthMap depth;
+    Camera camera;
+    double thickness = 0; // of the bodies behind the surfaces, scene units; 0: guessed from their silhouettes
+};
+
 struct Object {
     std::string name;
     TriangleMesh mesh;
     bool casts = true;
     bool receives = true;
+    std::optional<SeenSurface> seen = {}; // in place of the mesh
 };
 
 // Depth of what casts shadows, seen from the light. What a technique needs and is not given is rendered from the objects that cast.
@@ -139,6 +163,8 @@ struct Receivers {
     CameraSpec camera = LightCamera{};
     int width = 512, height = 512;
     std::optional<DepthMap> depth;
+    // What was fitted to a depth image that somebody else may have made: an Engine makes it where it is missing.
+    std::shared_ptr<const DepthSurface> surface = {};
 };
 
 // --- The scene -----------------------------------------------------------------------------------------------------------------

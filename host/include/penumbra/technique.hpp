@@ -6,6 +6,7 @@
 
 #include <penumbra/export.hpp>
 #include <penumbra/scene.hpp>
+#include <penumbra/technique/depth_trace.hpp>
 #include <penumbra/technique/occlusion_texture.hpp>
 #include <penumbra/technique/ray_traced.hpp>
 #include <penumbra/technique/shadow_map.hpp>
@@ -15,7 +16,7 @@
 
 namespace penumbra {
 
-using Technique = std::variant<ShadowMap, SoftShadowMap, SoftShadowVolume, OcclusionTexture, Smoothie, RayTraced>;
+using Technique = std::variant<ShadowMap, SoftShadowMap, SoftShadowVolume, OcclusionTexture, Smoothie, RayTraced, DepthTrace>;
 
 // The typed settings of a request, and back. Throws invalid_input for an unknown kind or key (naming the known ones), a value of the
 // wrong type or out of range.

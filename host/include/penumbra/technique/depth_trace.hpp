@@ -1,0 +1,15 @@
+// Settings of depth_trace.
+#pragma once
+
+#include <cstdint>
+
+namespace penumbra {
+
+// Shadow rays walked through depth images on the OpenCL device: those among the objects that cast, and the light's own view of the meshes.
+// Stratified over the light and seeded.
+struct DepthTrace {
+    int samples = 64; // rays a receiver
+    std::int64_t seed = 1;
+};
+
+} // namespace penumbra

@@ -1,0 +1,292 @@
+// One depth image, and the walk of a line through it: one text for OpenCL and for the host.
+//
+// A pixel's surface is a plane in *value*: disparity 1/z where the camera is a pinhole, and `far` - z where it is orthographic. Either way a
+// plane of space is linear over the image, a line of space is straight in (x, y, value), and nearer is greater. x and y count in pixels from the
+// image's upper left corner; pixel (0, 0)'s centre is at (0.5, 0.5).
+//
+// Every decision about a pixel is made from the pixel's own border and the line, never from where the walk came from: the pyramid changes no bit.
+#ifndef PENUMBRA_COMMON_DEPTH_WALK_H
+#define PENUMBRA_COMMON_DEPTH_WALK_H
+
+#ifdef __OPENCL_VERSION__
+#pragma OPENCL FP_CONTRACT OFF
+#define DEPTH_MEMORY __global const
+#define DEPTH_FUNCTION inline
+#else
+#include <math.h>
+#define DEPTH_MEMORY const
+#define DEPTH_FUNCTION inline
+#endif
+
+// Sides of the pyramid's blocks, coarse to fine; each level keeps the greatest value that a line can meet in its block.
+#define DEPTH_LEVELS 3
+#define DEPTH_BLOCK(level) (64 >> (2 * (level)))
+
+// Hits nearer to the receiver than this many pixels (|dx| + |dy|) are its own surface.
+#define DEPTH_OWN_PIXELS 2.0f
+
+typedef struct {
+    int width, height;
+    float pixel_x, pixel_y;   // tangents of a pixel; lengths where the camera is orthographic
+    float middle_x, middle_y; // the axis, in pixels
+    float nearest;            // the greatest value that a line can meet
+    float far;                // orthographic: value = far - z
+    int orthographic;
+    int level_width[DEPTH_LEVELS], level_offset[DEPTH_LEVELS]; // blocks in a row of each level; where the level begins
+} DepthView;
+
+// What a line meets in a pixel. value 0: nothing.
+typedef struct {
+    float value, slope_x, slope_y; // at the centre; change from one pixel to the next
+    float back;                    // how far the back lies behind the front, in value
+    float slack;                   // how far the front may be off
+    float joint;                   // the largest step to a neighbour on the same surface
+    float unused_0, unused_1;
+} DepthPixel;
+
+// From a point along a direction, in the camera's own coordinates: x right, y up, z along the view.
+typedef struct {
+    float x, y, z;
+} DepthVector;
+
+// A line in the image: (x, y, value) + t (step_x, step_y, step_value), from t = from to t = to. Its faster axis moves one pixel a unit of t.
+typedef struct {
+    float x, y, value;
+    float step_x, step_y, step_value;
+    float from, to;
+    float own; // hits before this many pixels do not count
+    float unit; // t of an unscaled step: see depth_along
+    float start_z;
+} DepthLine;
+
+// What a line met. blocked: it was between a front and its back. crossed: it went through a front that was seen, so it is blocked whatever the
+// backs are. behind: it went behind a front. left: it left the image before its end.
+typedef struct {
+    int blocked, crossed, behind, left;
+    float enter, leave; // t where the first solid begins and ends, with `through`
+} DepthMet;
+
+// A light as one image's camera sees it, and how receivers come into that camera's coordinates.
+typedef struct {
+    float image_from_receiver[12]; // 3 rows of 4
+    float centre[4];               // of the light; endless: the direction to it
+    float half_u[4], half_v[4];    // half extents; the disc's radius twice
+    int endless;                   // a directional light
+    int disc, sphere;              // square samples become a disc's; one that faces the receiver
+    int samples;
+    int first, count;              // of the receivers that this launch is for, and how many
+    int has_normals;
+    int own;                       // receivers lie on the image's own surfaces
+    int seed_low, seed_high;       // of the samples
+} DepthLight;
+
+// A camera's own view of a depth image.
+typedef struct {
+    float image_from_camera[12];
+    float pixel_x, pixel_y; // tangents of a pixel of the view; lengths where it is orthographic
+    int width, height, orthographic;
+} DepthSight;
+
+DEPTH_FUNCTION float depth_value(const DepthView view, const float z)
+{
+    return view.orthographic ? view.far - z : 1.0f / z;
+}
+
+// The line from `point` along `direction` (unlike a unit vector: its end is point + direction), or without end when `endless`. own: see DepthLine.
+// Not there (to < from) when no part of it can meet anything.
+DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, DepthVector direction, const int endless, const float own)
+{
+    DepthLine line;
+    line.own = own;
+    line.from = 0.0f;
+    line.to = -1.0f;
+    line.x = line.y = line.value = line.step_x = line.step_y = line.step_value = line.unit = line.start_z = 0.0f;
+    float length = 1.0f;
+    if (!view.orthographic) {
+        // What is behind the camera, or nearer than anything on the image, is passed over.
+        const float least = 0.5f / view.nearest;
+        if (!(point.z >= least)) {
+            if (!(direction.z > 0.0f)) return line;
+            const float skip = (least - point.z) / direction.z;
+            if (!endless && skip >= 1.0f) return line;
+            point.x += skip * direction.x;
+            point.y += skip * direction.y;
+            point.z = least;
+            length = 1.0f - skip;
+            line.own = 0.0f;
+        }
+        // With (X, Y, Z) = point + s direction: (X/Z, Y/Z, 1/Z) moves along (dx z - dz x, dy z - dz y, -dz) by s / (z Z), the same for all three.
+        const float end_z = point.z + length * direction.z;
+        line.x = point.x / point.z / view.pixel_x + view.middle_x;
+        line.y = view.middle_y - point.y / point.z / view.pixel_y;
+        line.value = 1.0f / point.z;
+        line.step_x = (direction.x * point.z - direction.z * point.x) / view.pixel_x;
+        line.step_y = -(direction.y * point.z - direction.z * point.y) / view.pixel_y;
+        line.step_value = -direction.z;
+        if (endless)
+            line.to = direction.z > 0.0f ? 1.0f / (point.z * direction.z) : 3e38f;
+        else
+            line.to = end_z > 0.0f ? length / (point.z * end_z) : 3e38f;
+    } else {
+        line.x = point.x / view.pixel_x + view.middle_x;
+        line.y = view.middle_y - point.y / view.pixel_y;
+        line.value = view.far - point.z;
+        line.step_x = direction.x / view.pixel_x;
+        line.step_y = -direction.y / view.pixel_y;
+        line.step_value = -direction.z;
+        line.to = endless ? 3e38f : 1.0f;
+    }
+    line.start_z = point.z;
+
+    // One pixel a unit of t. A line that hardly moves over the image: a unit is its own value.
+    const float across = fmax(fabs(line.step_x), fabs(line.step_y));
+    line.unit = fmax(across, fabs(line.step_value) / fmax(fabs(line.value), 1e-30f));
+    if (!(line.unit > 0.0f)) {
+        line.to = -1.0f;
+        return line;
+    }
+    line.step_x /= line.unit;
+    line.step_y /= line.unit;
+    line.step_value /= line.unit;
+    line.to = fmin(line.to * line.unit, 3e38f);
+
+    // Above everything on the image there is nothing to meet; nor beside it.
+    if (line.step_value > 0.0f) line.to = fmin(line.to, (view.nearest - line.value) / line.step_value);
+    if (line.step_value < 0.0f) line.from = fmax(line.from, (view.nearest - line.value) / line.step_value);
+    if (line.step_value == 0.0f && line.value > view.nearest) line.to = -1.0f;
+    if (line.step_x != 0.0f) {
+        const float a = -line.x / line.step_x, b = ((float)view.width - line.x) / line.step_x;
+        line.from = fmax(line.from, fmin(a, b));
+        line.to = fmin(line.to, fmax(a, b));
+    } else if (line.x < 0.0f || line.x >= (float)view.width) {
+        line.to = -1.0f;
+    }
+    if (line.step_y != 0.0f) {
+        const float a = -line.y / line.step_y, b = ((float)view.height - line.y) / line.step_y;
+        line.from = fmax(line.from, fmin(a, b));
+        line.to = fmin(line.to, fmax(a, b));
+    } else if (line.y < 0.0f || line.y >= (float)view.height) {
+        line.to = -1.0f;
+    }
+    return line;
+}
+
+// How far along depth_line's direction t is, in parts of the direction: from where the line begins, which is `point` unless that was passed over.
+DEPTH_FUNCTION float depth_along(const DepthView view, const DepthLine line, const float t)
+{
+    const float s = t / line.unit;
+    if (view.orthographic) return s;
+    return s * line.start_z * line.start_z / (1.0f + s * line.start_z * line.step_value * line.unit);
+}
+
+// The border of the cell `at` of cells of `side` pixels in the direction of `step`: behind it (ahead = 0) or before it (1).
+DEPTH_FUNCTION float depth_border(const int at, const int side, const float start, const float step, const float inverse, const int ahead)
+{
+    const int plus = (step > 0.0f) == (ahead != 0) ? 1 : 0;
+    return step != 0.0f ? ((float)((at + plus) * side) - start) * inverse : (ahead ? 3e38f : -3e38f);
+}
+
+// Where a line first meets the image, or (with `all`) everything that it meets; with `through` the first solid's extent as well.
+//
+//   pixels [height][width], nearest: the pyramid's levels, one after the other; levels: how many of them are used (0: every pixel is looked at)
+DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel* pixels, DEPTH_MEMORY float* nearest, const int levels,
+                                   const DepthLine line, const int all, const int through)
+{
+    DepthMet met;
+    met.blocked = met.crossed = met.behind = met.left = 0;
+    met.enter = met.leave = 0.0f;
+    if (!(line.from < line.to)) return met;
+    const float inverse_x = line.step_x != 0.0f ? 1.0f / line.step_x : 0.0f, inverse_y = line.step_y != 0.0f ? 1.0f / line.step_y : 0.0f;
+    const float speed = fabs(line.step_x) + fabs(line.step_y);
+    float t = line.from;
+    int cx = (int)floor(line.x + t * line.step_x), cy = (int)floor(line.y + t * line.step_y);
+    cx = cx < 0 ? 0 : cx >= view.width ? view.width - 1 : cx;
+    cy = cy < 0 ? 0 : cy >= view.height ? view.height - 1 : cy;
+
+    int solid = 0;                                     // inside the first solid
+    int joined = 1, was_behind = 0, last = cy * view.width + cx;
+    while (t < line.to && cx >= 0 && cy >= 0 && cx < view.width && cy < view.height) {
+        // The coarsest block that the line passes above.
+        int skipped = 0;
+        for (int level = 0; level < levels && !skipped && !solid; ++level) {
+            const int side = DEPTH_BLOCK(level), bx = cx / side, by = cy / side;
+            const float ex = depth_border(bx, side, line.x, line.step_x, inverse_x, 1), ey = depth_border(by, side, line.y, line.step_y, inverse_y, 1);
+            const float end = fmin(line.to, fmin(ex, ey));
+            const float lowest = fmin(line.value + t * line.step_value, line.value + end * line.step_value);
+            if (!(lowest > nearest[view.level_offset[level] + by * view.level_width[level] + bx])) continue;
+            skipped = joined = 1;
+            was_behind = 0;
+            t = end;
+            if (ex < ey) {
+                const int y = (int)floor(line.y + t * line.step_y), low = by * side, high = by * side + side - 1;
+                cx = line.step_x > 0.0f ? (bx + 1) * side : bx * side - 1;
+                cy = y < low ? low : y > high ? high : y;
+            } else {
+                const int x = (int)floor(line.x + t * line.step_x), low = bx * side, high = bx * side + side - 1;
+                cy = line.step_y > 0.0f ? (by + 1) * side : by * side - 1;
+                cx = x < low ? low : x > high ? high : x;
+            }
+            // The pixel that the line comes from, for `joined`.
+            int from_x = ex < ey ? cx - (line.step_x > 0.0f ? 1 : -1) : cx, from_y = ex < ey ? cy : cy - (line.step_y > 0.0f ? 1 : -1);
+            from_x = from_x < 0 ? 0 : from_x >= view.width ? view.width - 1 : from_x;
+            from_y = from_y < 0 ? 0 : from_y >= view.height ? view.height - 1 : from_y;
+            last = from_y * view.width + from_x;
+        }
+        if (skipped) continue;
+
+        // One pixel, between its own borders.
+        const float ex = depth_border(cx, 1, line.x, line.step_x, inverse_x, 1), ey = depth_border(cy, 1, line.y, line.step_y, inverse_y, 1);
+        const float begin = fmax(line.from, fmax(depth_border(cx, 1, line.x, line.step_x, inverse_x, 0), depth_border(cy, 1, line.y, line.step_y, inverse_y, 0)));
+        const float end = fmin(line.to, fmin(ex, ey));
+        const int j = cy * view.width + cx;
+        const float value = pixels[j].value;
+        if (value > 0.0f && begin <= end) {
+            const float slope_x = pixels[j].slope_x, slope_y = pixels[j].slope_y, slack = pixels[j].slack, back = pixels[j].back;
+            // How far behind the front the line is, where it enters and where it leaves.
+            const float base = value + slope_x * (line.x - (float)cx - 0.5f) + slope_y * (line.y - (float)cy - 0.5f) - line.value;
+            const float rise = slope_x * line.step_x + slope_y * line.step_y - line.step_value;
+            const float a = base + begin * rise, b = base + end * rise;
+            if (begin * speed >= line.own) {
+                const int hit = fmax(a, b) > slack && fmin(a, b) < back + slack;
+                if (through) {
+                    // Where the line is between front and back, within the pixel.
+                    float in = begin, out = end;
+                    const float deep = back + slack;
+                    if (hit && rise != 0.0f) {
+                        const float p = (slack - base) / rise, q = (deep - base) / rise;
+                        in = fmax(in, fmin(p, q));
+                        out = fmin(out, fmax(p, q));
+                    }
+                    if (hit && !solid) {
+                        met.enter = in;
+                        met.blocked = solid = 1;
+                    }
+                    if (solid && hit) met.leave = out;
+                    if (solid && (!hit || out < end)) return met;
+                } else {
+                    met.blocked |= hit;
+                    if (hit && !all) return met;
+                    const float step = fabs(value - pixels[last].value);
+                    met.crossed |= (a > slack) != (b > slack);
+                    met.crossed |= joined && was_behind != (a > slack) && step < pixels[j].joint;
+                    met.behind |= fmax(a, b) > slack;
+                }
+            }
+            was_behind = b > slack;
+            joined = 1;
+        } else {
+            if (through && solid) return met;
+            joined = 0;
+        }
+        last = j;
+        t = end;
+        if (ex < ey)
+            cx += line.step_x > 0.0f ? 1 : -1;
+        else
+            cy += line.step_y > 0.0f ? 1 : -1;
+    }
+    met.left = t < line.to || cx < 0 || cy < 0 || cx >= view.width || cy >= view.height;
+    return met;
+}
+
+#endif
