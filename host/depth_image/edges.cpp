@@ -53,7 +53,7 @@ Between between_two_surfaces(const ValueImage& image)
     const std::size_t count = image.value.size();
     Between result{.mixed = std::vector<std::uint8_t>(count), .toward_x = std::vector<std::int8_t>(count), .toward_y = std::vector<std::int8_t>(count)};
     const Values value{image};
-    std::vector<std::array<std::uint64_t, 2>> counted(static_cast<std::size_t>(image.height));
+    std::vector<std::array<std::uint64_t, 3>> counted(static_cast<std::size_t>(image.height));
     parallel_for(image.height, [&](int y) {
         for (int x = 0; x < image.width; ++x) {
             const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
@@ -66,9 +66,11 @@ Between between_two_surfaces(const ValueImage& image)
                 const float limit = 3 * std::max(beyond, outer) + 6 * image.sigma[i] + 1e-3f * here;
                 const bool found = (up > 0) == (down > 0) && std::abs(up) > limit && std::abs(down) > limit;
                 if (dx == 0 || dy == 0) {
-                    auto& [between, steps] = counted[static_cast<std::size_t>(y)];
+                    auto& [between, steps, seen_steps] = counted[static_cast<std::size_t>(y)];
+                    const bool step = std::abs(up) > 3 * std::max(std::abs(down), beyond) + 6 * image.sigma[i] + 2e-3f * here;
                     between += found;
-                    steps += std::abs(up) > 3 * std::max(std::abs(down), beyond) + 6 * image.sigma[i] + 2e-3f * here;
+                    steps += step;
+                    seen_steps += step && before > 0 && after > 0;
                 }
                 if (!found || result.mixed[i]) continue;
                 result.mixed[i] = 1;
@@ -77,9 +79,10 @@ Between between_two_surfaces(const ValueImage& image)
             }
         }
     });
-    for (const auto& [between, steps] : counted) {
+    for (const auto& [between, steps, seen_steps] : counted) {
         result.between += between;
         result.steps += steps;
+        result.seen_steps += seen_steps;
     }
     return result;
 }
@@ -126,7 +129,7 @@ std::vector<std::uint8_t> ramps(const ValueImage& image, int half_width)
     return grown;
 }
 
-bool is_smeared(const ValueImage& image, const std::vector<std::uint8_t>& ramp, std::uint64_t steps)
+bool is_smeared(const ValueImage& image, const std::vector<std::uint8_t>& ramp, std::uint64_t seen_steps)
 {
     const auto pixels = static_cast<std::uint64_t>(std::count_if(image.value.begin(), image.value.end(), [](float v) { return v > 0; }));
     // Pixels beside holes say nothing: their edge may have been dropped.
@@ -138,7 +141,7 @@ bool is_smeared(const ValueImage& image, const std::vector<std::uint8_t>& ramp, 
     std::uint64_t on_ramps = 0;
     for (std::size_t i = 0; i < ramp.size(); ++i) on_ramps += ramp[i] && there[i];
     // Measured: 4 to 11 pixels a step where edges are steps, 13,000 and more where none is; 256 pixels are two short edges.
-    return on_ramps > 60 * std::max<std::uint64_t>(steps, 1) && on_ramps > std::max<std::uint64_t>(256, pixels / 500);
+    return on_ramps > 60 * std::max<std::uint64_t>(seen_steps, 1) && on_ramps > std::max<std::uint64_t>(256, pixels / 500);
 }
 
 std::vector<std::uint8_t> closed_holes(int width, int height, const std::vector<std::uint8_t>& there, int reach)

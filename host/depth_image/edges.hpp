@@ -20,6 +20,7 @@ struct Between {
     std::vector<std::uint8_t> mixed;
     std::vector<std::int8_t> toward_x, toward_y;
     std::uint64_t between = 0, steps = 0; // pixels between two surfaces, and clean steps, along rows and columns
+    std::uint64_t seen_steps = 0;         // of the steps those between two surfaces that are there
 
     double share() const { return static_cast<double>(between) / static_cast<double>(std::max<std::uint64_t>(1, between + steps)); }
 };
@@ -30,7 +31,7 @@ Between between_two_surfaces(const ValueImage& image);
 std::vector<std::uint8_t> ramps(const ValueImage& image, int half_width);
 
 // Whether an image's edges are ramps: there are many, and hardly a clean step.
-bool is_smeared(const ValueImage& image, const std::vector<std::uint8_t>& ramp, std::uint64_t steps);
+bool is_smeared(const ValueImage& image, const std::vector<std::uint8_t>& ramp, std::uint64_t seen_steps);
 
 // Holes that a closing of `there` by `reach` pixels covers.
 std::vector<std::uint8_t> closed_holes(int width, int height, const std::vector<std::uint8_t>& there, int reach);

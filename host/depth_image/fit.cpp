@@ -245,7 +245,7 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     Between between = between_two_surfaces(image);
     const std::vector<std::uint8_t> ramp = ramps(image, ramp_width);
     fit.quality.edge_share = between.share();
-    fit.quality.smeared = is_smeared(image, ramp, between.steps);
+    fit.quality.smeared = is_smeared(image, ramp, between.seen_steps);
     fit.quality.antialiased = !fit.quality.smeared && between.share() >= .15;
     if (fit.quality.smeared) {
         for (std::size_t i = 0; i < count; ++i)

@@ -12,15 +12,16 @@
 namespace penumbra {
 namespace {
 
-// A symmetric graph: node i has links[begin[i]] to links[begin[i + 1]], and pulls on its own value with `hold`.
+// A symmetric graph: node i has links begin[i] to begin[i + 1], and is held where it is with the weight hold[i].
 struct Graph {
     std::vector<std::uint32_t> begin, to;
     std::vector<float> weight;   // of a link
-    std::vector<float> diagonal; // the links' weights and what holds the node
+    std::vector<float> hold;     // kept apart from the links' weights, of which it may be a tiny part
+    std::vector<float> diagonal; // all of them together
     std::vector<std::int32_t> x, y;
     std::vector<std::uint32_t> coarse; // its node on the next level
 
-    std::size_t size() const { return diagonal.size(); }
+    std::size_t size() const { return hold.size(); }
 };
 
 struct Link {
@@ -53,6 +54,9 @@ void set_links(Graph& graph, std::vector<Link> links)
         ++graph.begin[links[i].from + 1];
     }
     for (std::size_t i = 0; i < n; ++i) graph.begin[i + 1] += graph.begin[i];
+    graph.diagonal = graph.hold;
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::uint32_t e = graph.begin[i]; e < graph.begin[i + 1]; ++e) graph.diagonal[i] += graph.weight[e];
 }
 
 // The next level: nodes of a 2 x 2 block that hang together become one.
@@ -79,19 +83,16 @@ Graph coarser(Graph& fine)
             number[r] = static_cast<std::uint32_t>(coarse.x.size());
             coarse.x.push_back(fine.x[i] / 2);
             coarse.y.push_back(fine.y[i] / 2);
-            coarse.diagonal.push_back(0);
+            coarse.hold.push_back(0);
         }
         fine.coarse[i] = number[r];
     }
     std::vector<Link> links;
     for (std::uint32_t i = 0; i < n; ++i) {
-        coarse.diagonal[fine.coarse[i]] += fine.diagonal[i];
+        coarse.hold[fine.coarse[i]] += fine.hold[i];
         for (std::uint32_t e = fine.begin[i]; e < fine.begin[i + 1]; ++e) {
             const std::uint32_t a = fine.coarse[i], b = fine.coarse[fine.to[e]];
-            if (a == b)
-                coarse.diagonal[a] -= fine.weight[e];
-            else
-                links.push_back({a, b, fine.weight[e]});
+            if (a != b) links.push_back({a, b, fine.weight[e]});
         }
     }
     set_links(coarse, std::move(links));
@@ -195,7 +196,7 @@ std::vector<float> membrane(const DepthFit& fit, const std::vector<std::uint8_t>
             graph.x.push_back(x);
             graph.y.push_back(y);
         }
-    graph.diagonal.assign(graph.x.size(), held);
+    graph.hold.assign(graph.x.size(), held);
     if (graph.x.empty()) return fit.value;
 
     Numbers right(graph.size(), 0);
@@ -206,8 +207,10 @@ std::vector<float> membrane(const DepthFit& fit, const std::vector<std::uint8_t>
         const float step = fit.value[j] - fit.value[i];
         if (std::abs(step) > std::max(fit.joint(i), fit.joint(j))) return;
         const std::uint32_t a = number[i], b = number[j];
-        if (a != none) graph.diagonal[a] += 1, right[a] += step;
-        if (b != none) graph.diagonal[b] += 1, right[b] -= step;
+        if (a != none) right[a] += step;
+        if (b != none) right[b] -= step;
+        if (a != none && b == none) graph.hold[a] += 1;
+        if (b != none && a == none) graph.hold[b] += 1;
         if (a != none && b != none) links.push_back({a, b, 1}), links.push_back({b, a, 1});
     };
     for (int y = 0; y < fit.height; ++y)

@@ -56,6 +56,15 @@ std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Obje
     return result;
 }
 
+std::vector<std::pair<std::size_t, DepthQuality>> Geometry::State::qualities(bool Object::*role) const
+{
+    const std::lock_guard lock(fitting_);
+    std::vector<std::pair<std::size_t, DepthQuality>> result;
+    for (std::size_t i = 0; i < images_.size(); ++i)
+        if (images_[i] && (*objects)[i].*role) result.emplace_back(i, images_[i]->quality);
+    return result;
+}
+
 std::uint64_t Geometry::State::bytes() const
 {
     std::uint64_t total = 0;

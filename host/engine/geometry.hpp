@@ -30,6 +30,7 @@ struct Geometry::State {
     // Depth images among the objects that cast, or that receive, fitted on the device of `context` (null: a device of the environment's
     // choice). Each is fitted once.
     std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
+    std::vector<std::pair<std::size_t, DepthQuality>> qualities(bool Object::*role) const; // by object, of those fitted so far
     bool any_seen(bool Object::*role) const; // depth images among them
     bool any_mesh(bool Object::*role) const; // triangles among them
 

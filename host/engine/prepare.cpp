@@ -3,6 +3,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "depth_image/quality.hpp"
 #include "engine/depth_sources.hpp"
 #include "engine/geometry.hpp"
 #include "engine/impl.hpp"
@@ -139,6 +140,17 @@ void prepare_technique(Prepared::State& state, const Casting& casting)
     finish_prepare(work, state);
 }
 
+// What was found in the depth images that cast.
+void say_quality(Prepared::State& state, const Geometry& geometry)
+{
+    for (const auto& [index, quality] : geometry.state().qualities(&Object::casts)) {
+        const std::string where = "objects[" + std::to_string(index) + "].depth";
+        state.notes.push_back(quality_note(quality, where));
+        const std::vector<std::string> warnings = quality_warnings(quality, where);
+        state.warnings.insert(state.warnings.end(), warnings.begin(), warnings.end());
+    }
+}
+
 PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechnique& before, const Light& light)
 {
     const auto call = [&](const auto& prepared) -> PreparedTechnique {
@@ -241,6 +253,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, shown);
 
     prepare_technique(*state, casting);
+    say_quality(*state, geometry);
     state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view));
     if (needs.receivers_from_light && objects.any(&Object::receives)) state->receiver_geometry = geometry;
     return Prepared(state);

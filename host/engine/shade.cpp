@@ -2,6 +2,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "depth_image/light.hpp"
+#include "depth_image/quality.hpp"
 #include "engine/depth_sources.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
@@ -112,6 +114,11 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
                                   mask.report.stages.push_back({"render depth", render.ms(), 0, 0});
                                   return depth;
                               }};
+    if (surface) {
+        mask.report.notes.push_back(quality_note(surface->quality, "receivers.depth"));
+        const std::vector<std::string> warnings = quality_warnings(surface->quality, "receivers.depth");
+        mask.report.warnings.insert(mask.report.warnings.end(), warnings.begin(), warnings.end());
+    }
     if (surface && !receivers.surface) mask.report.stages.push_back({"fit depth", fit_ms, 0, 0});
     opencl::Buffer<float> visibility;
     if (!row_of(mask.report.technique).on_host)
@@ -119,6 +126,9 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
     ShadeCounts counts;
     Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts};
     shade_technique(work, state, receiving, shaded);
+    // Techniques that trace depth images clip the light sample by sample.
+    if (surface && visibility && !needs_of(state.technique).depth_images)
+        clip_at_horizon(work, state.light, *surface, state.channels, visibility.memory());
     mask.visibility = image_of(work, state, receivers, visibility, shaded);
 
     add_stages(mask.report.stages, work.finish());

@@ -6,6 +6,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "depth_image/light.hpp"
 #include "depth_image/views.hpp"
 #include "technique/keys.hpp"
 #include "trace/light_samples.hpp"
@@ -24,26 +25,10 @@ DeviceDepthImage on_device(opencl::Work& work, const DepthImage& image)
             .nearest = work.upload(std::span<const float>(image.nearest), "depth image's pyramid")};
 }
 
-void set(float (&to)[4], const Vec3& v)
-{
-    to[0] = static_cast<float>(v.x);
-    to[1] = static_cast<float>(v.y);
-    to[2] = static_cast<float>(v.z);
-    to[3] = 0;
-}
-
 // The light as an image's camera sees it.
 DepthLight light_for(const PreparedDepthTrace& prepared, const Camera& image, const Camera& receivers, bool has_normals)
 {
-    const LightFrame frame = light_frame(prepared.light);
-    DepthLight light{};
-    set_transform(light.image_from_receiver, image, receivers);
-    set(light.centre, frame.directional ? direction_from_world(image, -frame.direction) : camera_from_world(image, frame.origin));
-    set(light.half_u, direction_from_world(image, frame.u * frame.half_u));
-    set(light.half_v, direction_from_world(image, frame.v * frame.half_v));
-    light.endless = frame.directional;
-    light.disc = frame.shape == LightShape::disc;
-    light.sphere = std::holds_alternative<SphereLight>(prepared.light);
+    DepthLight light = depth_light(prepared.light, image, receivers);
     light.samples = prepared.samples;
     light.has_normals = has_normals;
     light.own = 1;

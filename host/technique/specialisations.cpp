@@ -1,6 +1,7 @@
 // Every program that can be asked for, found by walking the techniques' own keys.
 #include <set>
 
+#include "depth_image/light.hpp"
 #include "depth_image/views.hpp"
 #include "technique/occluder_maps.hpp"
 #include "technique/techniques.hpp"
@@ -45,6 +46,7 @@ std::vector<opencl::Specialisation> every_specialisation()
     };
     add(depth_fit_program());
     add(depth_trace_program());
+    add(horizon_program());
     add(receivers_program());
     add(occluders_program());
     for (const TechniqueRow& row : technique_table()) {
