@@ -16,7 +16,7 @@ void set_transform(float (&to_from)[12], const Camera& to, const Camera& from)
     }
 }
 
-opencl::Specialisation depth_trace_program() { return {"depth_trace.cl", {}}; }
+opencl::Specialisation depth_trace_program(int lanes) { return {"depth_trace.cl", {{"LANES", std::to_string(lanes)}}}; }
 
 void add_view(opencl::Work& work, const DepthImage& image, const Camera& camera, DepthMap& front, DepthMap& back)
 {
@@ -30,7 +30,7 @@ void add_view(opencl::Work& work, const DepthImage& image, const Camera& camera,
     const auto pixels = work.upload(std::span<const DepthPixel>(image.pixels), "depth image");
     const auto nearest = work.upload(std::span<const float>(image.nearest), "depth image's pyramid");
     const auto fronts = work.upload(std::span<const float>(front.depth), "front depth"), backs = work.upload(std::span<const float>(back.depth), "back depth");
-    work.launch(depth_trace_program(), "depth_view", {static_cast<std::size_t>(front.width), static_cast<std::size_t>(front.height)}, {16, 8},
+    work.launch(depth_trace_program(work.context().quirks().lanes), "depth_view", {static_cast<std::size_t>(front.width), static_cast<std::size_t>(front.height)}, {16, 8},
                 pixels.bytes() + 2 * fronts.bytes(), image.view, sight, pixels, nearest, fronts, backs);
     front.depth = work.read(fronts);
     back.depth = work.read(backs);

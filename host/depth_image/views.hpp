@@ -12,7 +12,7 @@ void set_transform(float (&to_from)[12], const Camera& to, const Camera& from);
 // and where that body ends where that is further than `back` has.
 void add_view(opencl::Work& work, const DepthImage& image, const Camera& camera, DepthMap& front, DepthMap& back);
 
-// The program of depth_trace.cl.
-opencl::Specialisation depth_trace_program();
+// The program of depth_trace.cl, on a device of so many lanes.
+opencl::Specialisation depth_trace_program(int lanes);
 
 } // namespace penumbra

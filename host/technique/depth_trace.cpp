@@ -117,6 +117,8 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
 
     work.stage("shade");
     const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
+    const std::size_t bundles = (words + 1) / 2;
+    const opencl::Specialisation program = depth_trace_program(work.context().quirks().lanes);
     const std::size_t band = std::min(points.size(), std::max<std::size_t>(most_words / words, 1));
     const std::vector<cl_uint> none(words * band, 0);
     for (std::size_t first = 0; first < points.size(); first += band) {
@@ -126,10 +128,10 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
             DepthLight light = light_for(prepared, image.camera, receivers.camera, receivers.surface != nullptr);
             light.first = static_cast<int>(first);
             light.count = static_cast<int>(count);
-            work.launch(depth_trace_program(), "depth_trace", {count, 1}, {64, 1}, count * 24, image.view, light, cl_int{0}, image.pixels,
-                        image.nearest, on_points, normals, prepared.strata, prepared.step, blocked, cl::Buffer(), cl::Buffer(), cl::Buffer());
+            work.launch(program, "depth_trace_bundles", {count, bundles}, {64, 1}, count * 24, image.view, light, image.pixels, image.nearest,
+                        on_points, normals, prepared.strata, prepared.step, blocked);
         }
-        work.launch(depth_trace_program(), "depth_count", {count, 1}, {64, 1}, count * (words * 4 + 16), static_cast<cl_int>(first),
+        work.launch(program, "depth_count", {count, 1}, {64, 1}, count * (words * 4 + 16), static_cast<cl_int>(first),
                     static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{0}, on_points, blocked, cl::Buffer(), cl::Buffer(),
                     shaded.visibility, cl::Buffer(), cl::Buffer());
     }
@@ -144,7 +146,7 @@ std::vector<WorkAmount> work(const DepthTrace& settings, const MaskShape& shape)
     return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples, WorkAmount::Unit::rays, "rays"}};
 }
 
-std::vector<opencl::Specialisation> specialisations(const DepthTrace&, int) { return {depth_trace_program()}; }
+std::vector<opencl::Specialisation> specialisations(const DepthTrace&, int lanes) { return {depth_trace_program(lanes)}; }
 
 DeviceBuffers device_buffers(const DepthTrace&)
 {

@@ -45,7 +45,7 @@ std::vector<opencl::Specialisation> every_specialisation()
         if (known.insert(program.file + ' ' + program.options()).second) all.push_back(program);
     };
     add(depth_fit_program());
-    add(depth_trace_program());
+    for (const int lanes : {1, 8, 16}) add(depth_trace_program(lanes));
     add(horizon_program());
     add(receivers_program());
     add(occluders_program());
