@@ -116,7 +116,7 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
             bits |= met.blocked ? bit : 0;
             sure |= met.crossed ? bit : 0;
             maybe |= met.behind ? bit : 0;
-            outside += met.left;
+            outside += !met.crossed && met.left;
         }
         blocked[word] = bits;
         if (!bounds) continue;

@@ -6,6 +6,7 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
+#include <penumbra/mask_job.hpp>
 #include <penumbra/scene.hpp>
 
 #include "files.hpp"
@@ -22,7 +23,7 @@ namespace penumbra::cli {
 namespace {
 
 struct Flags {
-    std::string scene, mask, report, device, server;
+    std::string scene, mask, report, bound, device, server;
     MaskChoice choice;
     TechniqueFlags technique;
 };
@@ -67,6 +68,13 @@ std::vector<MaskFile> check_files(const Flags& flags)
         require_place_for(flags.report, "--report");
         require_different(flags.report, "--report", flags.scene, "SCENE.json");
     }
+    if (!flags.bound.empty()) {
+        require_place_for(flags.bound, "--bound");
+        require_different(flags.bound, "--bound", flags.scene, "SCENE.json");
+        require_different(flags.bound, "--bound", flags.mask, "-o");
+        if (format_for(flags.bound, {}, "--bound").format != "exr")
+            throw Error(ErrorCode::usage, "--bound " + flags.bound + ": is no EXR file", "expected a name that ends in .exr: it has two channels, low and high");
+    }
     const nlohmann::json json = json_in(flags.scene);
     std::vector<MaskFile> files = mask_files(flags.mask, json, flags.choice);
     std::vector<std::string> paths;
@@ -90,6 +98,8 @@ int run(const Flags& flags)
 {
     // Refuse in order of cost: names, then the scene, then the device, then the work.
     const std::vector<MaskFile> files = check_files(flags);
+    if (!flags.server.empty() && !flags.bound.empty())
+        throw Error(ErrorCode::usage, "--bound " + flags.bound + ": does not go with --server", "POST to /v1/masks?result=bound in its place");
     if (!flags.server.empty()) return run_on_server(flags, files);
 
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
@@ -115,6 +125,11 @@ int run(const Flags& flags)
         const std::string file = mask_file(flags.mask, named.light, named.frame);
         progress.step("writing " + file);
         write_image(file, named.mask.visibility, format);
+        if (!flags.bound.empty()) {
+            const std::string bound = mask_file(flags.bound, named.light, named.frame);
+            progress.step("writing " + bound);
+            write_image(bound, named.mask.bound, {.format = "exr", .bits = 32, .channels = {"low", "high"}});
+        }
         // Those of each light come again, with its name, from all lights together.
         if (named.light.empty())
             for (const std::string& warning : named.mask.report.warnings)
@@ -122,7 +137,11 @@ int run(const Flags& flags)
         reports.push_back({named.light, named.frame, file, std::move(named.mask.report)});
         progress.step("computing the next mask");
     };
-    in_scene(flags.scene, [&] { engine.masks(scene, technique, write); });
+    in_scene(flags.scene, [&] {
+        MaskJob job = job_of(scene, technique);
+        job.bound = !flags.bound.empty();
+        engine.masks(job, {}, write);
+    });
     progress.end();
     print_warnings(warnings);
     if (!flags.report.empty()) write_report(flags, report_text(reports));
@@ -142,6 +161,9 @@ Verb mask_verb(CLI::App& program)
         ->required();
     add_technique_flags(*app, flags->technique);
     app->add_option("--report", flags->report, "stages with milliseconds, bytes, device, warnings")->option_text("REPORT.json");
+    app->add_option("--bound", flags->bound,
+                    "the lowest and the highest visibility that each pixel can have (channels low, high), where depth\nimages cast and what lies behind them is not known; by depth_trace or ray_traced")
+        ->option_text("BOUND.exr");
     app->add_option("--light", flags->choice.light, "of several lights, the mask of this one alone")->option_text("NAME");
     app->add_option("--frame", flags->choice.frame, "of a sequence, the masks of this frame alone, from 1")
         ->option_text("N")

@@ -42,6 +42,7 @@ std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Obje
 {
     const std::lock_guard lock(fitting_);
     images_.resize(objects->size());
+    surfaces_.resize(objects->size());
     std::vector<std::shared_ptr<const DepthImage>> result;
     for (std::size_t i = 0; i < objects->size(); ++i) {
         const Object& object = (*objects)[i];
@@ -49,11 +50,27 @@ std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Obje
         if (!images_[i]) {
             const SeenSurface& seen = *object.seen;
             opencl::Work work(context ? context : opencl::Context::open({}));
-            images_[i] = std::make_shared<const DepthImage>(depth_image(fit_depth(work, seen.depth, seen.camera), seen.camera, seen.thickness));
+            const DepthFit fit = fit_depth(work, seen.depth, seen.camera);
+            images_[i] = std::make_shared<const DepthImage>(depth_image(fit, seen.camera, seen.thickness));
+            surfaces_[i] = std::make_shared<const DepthSurface>(depth_surface(fit, seen.camera));
         }
         result.push_back(images_[i]);
     }
     return result;
+}
+
+std::shared_ptr<const DepthSurface> Geometry::State::surface_of_same(const DepthMap& depth, const Camera& camera) const
+{
+    const std::lock_guard lock(fitting_);
+    const auto same_frame = [](const Frame& a, const Frame& b) { return a.origin == b.origin && a.x == b.x && a.y == b.y && a.z == b.z; };
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+        if (!surfaces_[i]) continue;
+        const SeenSurface& seen = *(*objects)[i].seen;
+        const DepthMap& own = seen.depth;
+        const bool same_camera = same_frame(seen.camera.frame, camera.frame) && seen.camera.half_extent == camera.half_extent && seen.camera.orthographic == camera.orthographic;
+        if (same_camera && own.width == depth.width && own.height == depth.height && own.noise == depth.noise && own.depth == depth.depth) return surfaces_[i];
+    }
+    return nullptr;
 }
 
 std::vector<std::pair<std::size_t, DepthQuality>> Geometry::State::qualities(bool Object::*role) const

@@ -31,6 +31,8 @@ struct Geometry::State {
     // choice). Each is fitted once.
     std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
     std::vector<std::pair<std::size_t, DepthQuality>> qualities(bool Object::*role) const; // by object, of those fitted so far
+    // The receivers on an object's depth image, where that is the same image: they need no fit of their own. Null: there is none.
+    std::shared_ptr<const DepthSurface> surface_of_same(const DepthMap& depth, const Camera& camera) const;
     bool any_seen(bool Object::*role) const; // depth images among them
     bool any_mesh(bool Object::*role) const; // triangles among them
 
@@ -48,6 +50,7 @@ private:
     mutable std::shared_ptr<const Tracer> casters_, receivers_;
     mutable std::shared_ptr<const Topology> topology_;
     mutable std::mutex fitting_;
+    mutable std::vector<std::shared_ptr<const DepthSurface>> surfaces_;
     mutable std::vector<std::shared_ptr<const DepthImage>> images_; // of each object; null: not fitted, or a mesh
 };
 

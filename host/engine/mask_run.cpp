@@ -108,7 +108,8 @@ private:
         if (complete.depth->from_image) {
             const Stopwatch fitting;
             const Camera camera = resolve_camera(complete.camera, light, {}, complete.width, complete.height, "receivers.camera");
-            complete.surface = surface_of(complete, camera, context);
+            complete.surface = job_.geometry.state().surface_of_same(*complete.depth, camera);
+            if (!complete.surface) complete.surface = surface_of(complete, camera, context);
             stages.push_back({"fit depth", fitting.ms(), 0, 0});
         }
         receivers_ = std::make_shared<const Receivers>(std::move(complete));
@@ -124,7 +125,7 @@ private:
         std::vector<Stage> stages;
         const Receivers& seen = receivers(job_.lights[index].light, made.state().context, stages);
         before("shading");
-        Mask mask = engine_.shade(made, seen);
+        Mask mask = engine_.shade(made, seen, job_.bound);
         Report& report = mask.report;
         if (!kept) {
             add_stages(stages, made.state().stages);
@@ -278,18 +279,22 @@ void Engine::masks(const MaskJob& job, const MaskHooks& hooks, const MaskSink& s
     MaskRun run(*this, job, hooks);
     const int frames = run.frames();
     for (int frame = frames > 0 ? 1 : 0; frame <= frames; ++frame) {
-        WeightedMean mean;
+        WeightedMean mean, bounds;
         Report report;
         for (std::size_t i = 0; i < job.lights.size(); ++i) {
             const MaskLight& light = job.lights[i];
             Mask mask = run.of(i, frame);
             if (job.combined) {
                 mean.add(mask.visibility, light.weight);
+                if (job.bound) bounds.add(mask.bound, light.weight);
                 add_report(report, mask.report, light.name, job.warnings);
             }
             sink({.light = light.name, .frame = frame, .mask = std::move(mask)});
         }
-        if (job.combined) sink(together(mean, std::move(report), frame));
+        if (!job.combined) continue;
+        NamedMask all = together(mean, std::move(report), frame);
+        if (job.bound) all.mask.bound = bounds.take();
+        sink(std::move(all));
     }
 }
 

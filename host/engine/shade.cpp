@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <cstdio>
 
 #include <penumbra/error.hpp>
 
@@ -58,8 +60,22 @@ DepthMap light_view_depth(const Prepared::State& state, const Receivers& receive
     return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, true, false, state.context).front;
 }
 
+// What of the light's samples nobody knows.
+void say_unknown(const ShadeCounts& counts, Report& report)
+{
+    if (counts.followed == 0) return;
+    const auto percent = [&](std::uint64_t some) { return static_cast<double>(some) * 100 / static_cast<double>(counts.followed); };
+    std::array<char, 240> text{};
+    std::snprintf(text.data(), text.size(),
+                  "%.1f %% of the light's samples pass behind a surface that was seen and never through one: how thick it is was guessed; "
+                  "%.1f %% leave a depth image, and what is there counts as empty",
+                  percent(counts.behind), percent(counts.left));
+    report.notes.emplace_back(text.data());
+}
+
 void warn_of_counts(const Prepared::State& state, const ShadeCounts& counts, Report& report)
 {
+    say_unknown(counts, report);
     report.pairs = counts.pairs;
     if (counts.uncovered_receivers > 0 && !state.covered)
         report.warnings.push_back(
@@ -86,9 +102,11 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const Receivers
 
 } // namespace
 
-Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
+Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bound) const
 {
     const Prepared::State& state = prepared.state();
+    if (bound && !row_of(kind_of(state.technique)).bounds)
+        throw Error(ErrorCode::unsupported, kind_of(state.technique) + " has no bounds", "depth_trace and ray_traced have");
     if (!receivers.depth)
         throw Error::at(ErrorCode::invalid_input, "receivers.depth", "is missing",
                         "expected a depth map; with_depth renders it from objects");
@@ -124,7 +142,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers) const
     if (!row_of(mask.report.technique).on_host)
         visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");
     ShadeCounts counts;
-    Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts};
+    Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .bound = bound ? &mask.bound : nullptr};
     shade_technique(work, state, receiving, shaded);
     // Techniques that trace depth images clip the light sample by sample.
     if (surface && visibility && !needs_of(state.technique).depth_images)
@@ -161,7 +179,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .surface = nullptr,
                               .view = state.light_view,
                               .from_light = {}};
-    Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr};
+    Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr, .bound = nullptr};
     shade_technique(work, state, receiving, shaded);
     work.finish();
 }

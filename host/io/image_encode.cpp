@@ -108,6 +108,11 @@ std::vector<std::byte> encode_image(const Image& image, const OutputFormat& requ
     if (format.bits == 16)
         check_values(image, title, "values up to 65504", [](float v) { return !std::isfinite(v) || std::abs(v) <= largest_half; });
     static constexpr const char *grey[] = {"Y", "A"}, *colours[] = {"R", "G", "B", "A"};
+    if (format.channels.size() == static_cast<std::size_t>(image.channels)) {
+        std::vector<const char*> names;
+        for (const std::string& name : format.channels) names.push_back(name.c_str());
+        return encode_exr(image, format.bits, names);
+    }
     return encode_exr(image, format.bits, {image.channels < 3 ? grey : colours, static_cast<std::size_t>(image.channels)});
 }
 

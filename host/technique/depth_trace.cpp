@@ -62,6 +62,83 @@ void leave_out_behind(std::vector<DepthVector>& points, const Light& light, cons
         if (p.z > 0 && light_from_world(frame, world_from_camera(camera, Vec3(p.x, p.y, p.z))).z <= 0) p.z = 0;
 }
 
+// What the samples of some receivers meet on all their way: a walk for each, which is slow.
+struct Followed {
+    opencl::Buffer<DepthVector> points;
+    opencl::Buffer<cl_uint> blocked, crossed, unknown, left;
+    std::size_t count = 0;
+};
+Followed follow(opencl::Work& work, const PreparedDepthTrace& prepared, const Receiving& receivers, std::span<const DepthVector> points,
+                std::span<const DepthVector> normals)
+{
+    const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
+    const std::vector<cl_uint> none(words * points.size(), 0);
+    const auto room = [&](std::size_t count, const char* what) { return work.upload(std::span<const cl_uint>(none).first(count), what); };
+    Followed followed{.points = work.upload(points, "receiver points"),
+                      .blocked = room(none.size(), "blocked samples"),
+                      .crossed = room(none.size(), "samples that are blocked for certain"),
+                      .unknown = room(none.size(), "samples that nobody knows of"),
+                      .left = room(points.size(), "samples that leave the image"),
+                      .count = points.size()};
+    opencl::Buffer<DepthVector> on_normals;
+    if (!normals.empty()) on_normals = work.upload(normals, "receiver normals");
+    for (const DeviceDepthImage& image : *prepared.images) {
+        DepthLight light = light_for(prepared, image.camera, receivers.camera, !normals.empty());
+        light.count = static_cast<int>(points.size());
+        work.launch(depth_trace_program(work.context().quirks().lanes), "depth_trace", {points.size(), 1}, {64, 1}, points.size() * 24, image.view,
+                    light, cl_int{1}, image.pixels, image.nearest, followed.points, on_normals, prepared.strata, prepared.step, followed.blocked,
+                    followed.crossed, followed.unknown, followed.left);
+    }
+    return followed;
+}
+
+// The lowest and the highest visibility of each receiver.
+Image bound_of(opencl::Work& work, const PreparedDepthTrace& prepared, const Receiving& receivers, const std::vector<DepthVector>& points)
+{
+    work.stage("bound");
+    Image bound{.width = receivers.width, .height = receivers.height, .channels = 2, .pixels = std::vector<float>(2 * points.size(), 1.f)};
+    const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
+    const std::size_t band = std::min(points.size(), std::max<std::size_t>(most_words / words / 4, 1));
+    for (std::size_t first = 0; first < points.size(); first += band) {
+        const std::size_t count = std::min(band, points.size() - first);
+        const auto some = std::span<const DepthVector>(points).subspan(first, count);
+        const auto normals = receivers.surface ? std::span<const DepthVector>(receivers.surface->normals).subspan(first, count) : std::span<const DepthVector>{};
+        const Followed followed = follow(work, prepared, receivers, some, normals);
+        const auto room = [&] { return work.buffer<float>(count, "bounds"); };
+        const auto visibility = room(), low = room(), high = room();
+        work.launch(depth_trace_program(work.context().quirks().lanes), "depth_count", {count, 1}, {64, 1}, count * (words * 12 + 16), cl_int{0},
+                    static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{1}, followed.points, followed.blocked,
+                    followed.crossed, followed.unknown, visibility, low, high);
+        const std::vector<float> lowest = work.read(low), highest = work.read(high);
+        for (std::size_t i = 0; i < count; ++i) {
+            bound.pixels[2 * (first + i)] = lowest[i];
+            bound.pixels[2 * (first + i) + 1] = highest[i];
+        }
+    }
+    return bound;
+}
+
+// Follows the samples of a grid of receivers and counts what they met.
+void follow_some(opencl::Work& work, const PreparedDepthTrace& prepared, const Receiving& receivers, const std::vector<DepthVector>& points,
+                 ShadeCounts& counts)
+{
+    work.stage("follow some");
+    std::vector<DepthVector> some, normals;
+    for (int y = followed_grid / 2; y < receivers.height; y += followed_grid)
+        for (int x = followed_grid / 2; x < receivers.width; x += followed_grid) {
+            const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(receivers.width) + static_cast<std::size_t>(x);
+            if (!(points[i].z > 0)) continue;
+            some.push_back(points[i]);
+            if (receivers.surface) normals.push_back(receivers.surface->normals[i]);
+        }
+    if (some.empty()) return;
+    const Followed followed = follow(work, prepared, receivers, some, normals);
+    const std::vector<cl_uint> crossed = work.read(followed.crossed), unknown = work.read(followed.unknown), left = work.read(followed.left);
+    counts.followed = some.size() * static_cast<std::uint64_t>(prepared.samples);
+    for (std::size_t i = 0; i < crossed.size(); ++i) counts.behind += static_cast<std::uint64_t>(std::popcount(unknown[i] & ~crossed[i]));
+    for (const cl_uint samples : left) counts.left += samples;
+}
+
 } // namespace
 
 TechniqueRow row(const DepthTrace&)
@@ -75,6 +152,7 @@ TechniqueRow row(const DepthTrace&)
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = false,
             .inputs = "depth objects that cast, or occluder depth (front) from the light's centre (or objects that cast); receiver depth (or objects)",
+            .bounds = true,
             .defaults = DepthTrace{}};
 }
 
@@ -135,7 +213,9 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
                     static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{0}, on_points, blocked, cl::Buffer(), cl::Buffer(),
                     shaded.visibility, cl::Buffer(), cl::Buffer());
     }
+    if (shaded.bound) *shaded.bound = bound_of(work, prepared, receivers, points);
     if (!shaded.counts) return;
+    follow_some(work, prepared, receivers, points, *shaded.counts);
     const auto there = std::count_if(points.begin(), points.end(), [](const DepthVector& p) { return p.z > 0; });
     shaded.counts->receivers = static_cast<std::uint64_t>(there);
     shaded.counts->pairs = static_cast<std::uint64_t>(there) * static_cast<std::uint64_t>(prepared.samples);

@@ -20,6 +20,7 @@ TechniqueRow row(const RayTraced&)
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = true,
             .inputs = "objects that cast; receiver depth (or objects that receive)",
+            .bounds = true,
             .on_host = true,
             .defaults = RayTraced{}};
 }
@@ -44,9 +45,14 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
                                                 .adaptive = prepared.settings.adaptive,
                                                 .first_samples = prepared.settings.first_samples,
                                                 .seed = static_cast<std::uint64_t>(prepared.settings.seed)},
-                                               {.images = prepared.images, .surface = receivers.surface});
+                                               {.images = prepared.images, .surface = receivers.surface, .bounds = shaded.bound != nullptr});
     shaded.image = std::move(result.visibility);
-    if (shaded.counts) shaded.counts->pairs = result.rays;
+    if (shaded.bound) *shaded.bound = std::move(result.bound);
+    if (!shaded.counts) return;
+    shaded.counts->pairs = result.rays;
+    shaded.counts->followed = result.followed;
+    shaded.counts->behind = result.behind;
+    shaded.counts->left = result.left;
 }
 
 std::vector<WorkAmount> work(const RayTraced& settings, const MaskShape& shape)

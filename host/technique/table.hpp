@@ -38,6 +38,7 @@ struct TechniqueRow {
     std::vector<std::string_view> lights; // kinds it takes, as in light.kind
     bool textured_lights;                 // whether it takes a rectangle's emission
     std::string_view inputs;              // what it needs, in words
+    bool bounds = false; // gives the lowest and the highest visibility, too
     bool on_host = false;                 // whether it shades on the host's cores
     Technique defaults;
 };

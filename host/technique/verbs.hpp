@@ -98,6 +98,9 @@ struct ShadeCounts {
     std::uint64_t pairs = 0;               // (texel, receiver) pairs evaluated; rays
     std::uint64_t receivers = 0;           // that are there
     std::uint64_t uncovered_receivers = 0; // that see part of the light past the occluder map's border
+    // Of samples of the light that were followed through depth images, from some receivers of a grid: all, those that pass behind a seen
+    // surface and never through one, those that leave the image.
+    std::uint64_t followed = 0, behind = 0, left = 0;
 };
 
 // Where shade puts its result: into the buffer where it runs on the device, into the image where it runs on the host.
@@ -105,7 +108,12 @@ struct Shaded {
     cl::Buffer visibility; // [height][width][channels] float32
     Image image;
     ShadeCounts* counts = nullptr; // null: do not wait for the device to count
+    // Where it is wanted (a row's `bounds`): the lowest and the highest visibility that each receiver can have, two channels.
+    Image* bound = nullptr;
 };
+
+// Receivers whose samples are followed to their end, for the report: one of so many each way.
+constexpr int followed_grid = 16;
 
 // The size of what a mask is made from.
 struct MaskShape {

@@ -53,11 +53,14 @@ struct VisibilityOptions {
 struct SeenScene {
     std::span<const std::shared_ptr<const DepthImage>> images; // walked with the same samples
     const DepthSurface* surface = nullptr;                     // receivers of somebody else's depth: lifted, the light clipped at their planes
+    bool bounds = false;                                       // VisibilityResult::bound is wanted
 };
 
 struct VisibilityResult {
     Image visibility;       // 1 channel, or 3 for a textured light
+    Image bound;            // two channels: the lowest and the highest that visibility can be, where depth images cast
     std::uint64_t rays = 0; // shadow rays cast
+    std::uint64_t followed = 0, behind = 0, left = 0; // of the samples followed to their end: all, never through a front, out of the image
 };
 
 // Ray-traced visibility of the light at each pixel of a receiver depth map; 1 where nothing is there or behind the light's plane.

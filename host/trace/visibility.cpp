@@ -25,6 +25,7 @@ namespace penumbra {
 namespace {
 
 constexpr int tile = 4;
+constexpr int followed_step = 16; // receivers whose rays are followed to their end: one of so many each way
 
 // What a light's texture weighs: nearest texel, constant over the texel, so that sums over texels are exact.
 class Emission {
@@ -69,6 +70,7 @@ struct Receiver {
     bool sees_light = false; // false: nothing there, or behind the light's plane
     Vec3 point;              // traced space
     std::size_t pixel = 0;
+    bool followed = false; // its rays are followed to their end, for the report
     Vec3 normal{0, 0, 0}; // world space; 0: the light is not clipped
 };
 
@@ -81,6 +83,7 @@ struct WalkedImage {
 // What one receiver's rays met.
 struct Tally {
     int rays = 0, free = 0;
+    int certain = 0, unknown = 0, left = 0; // blocked whatever the backs of depth images are; only behind fronts; out of the image
     double sum[3] = {}, free_sum[3] = {}; // of emission, where the channel varies
 
     bool agree() const { return free == 0 || free == rays; }
@@ -102,6 +105,10 @@ public:
                const VisibilityOptions& options, const SeenScene& seen)
         : scene_(scene), light_(light), receivers_(receivers), camera_(camera), options_(options), seen_(seen)
     {
+        if (seen.bounds) {
+            result_.bound = {.width = receivers.width, .height = receivers.height, .channels = 2, .pixels = {}};
+            result_.bound.pixels.assign(result_.bound.pixel_count() * 2, 1.f);
+        }
         for (const auto& image : seen.images) {
             const Camera& to = image->camera;
             const LightFrame& frame = light.frame;
@@ -122,6 +129,9 @@ public:
         else
             cast_tiles(samples, 0, {}, nullptr);
         result_.rays = rays_;
+        result_.followed = followed_;
+        result_.behind = behind_;
+        result_.left = left_;
         scene_.check("rtcOccluded16");
         return std::move(result_);
     }
@@ -175,6 +185,7 @@ private:
                             static_cast<std::uint8_t>((tally.free > 0 ? free : nothing) | (tally.free < tally.rays ? blocked : nothing));
                         rays += static_cast<std::uint64_t>(tally.rays);
                         store(x, y, tally);
+                        if (receiver.followed) count_followed(tally);
                     }
                 if (met) (*met)[tile_index(column, row)] = seen;
             }
@@ -221,11 +232,18 @@ private:
         return {.sees_light = true,
                 .point = scene_.traced_from_world(world),
                 .pixel = i,
+                .followed = !images_.empty() && x % followed_step == followed_step / 2 && y % followed_step == followed_step / 2,
                 .normal = world_from_camera(camera_, Vec3(n.x, n.y, n.z)) - camera_.frame.origin};
     }
 
-    // Marks the rays of a packet that an image blocks.
-    void walk(const Receiver& receiver, const float (&x)[packet], const float (&y)[packet], const int (&valid)[packet], float (&tfar)[packet]) const
+    // What the rays of a packet meet in images beside what blocks them.
+    struct Followed {
+        bool crossed[packet] = {}, behind[packet] = {}, left[packet] = {};
+    };
+
+    // Marks the rays of a packet that an image blocks; with `followed` all the way, whatever blocks them.
+    void walk(const Receiver& receiver, const float (&x)[packet], const float (&y)[packet], const int (&valid)[packet], float (&tfar)[packet],
+              Followed* followed) const
     {
         const Vec3 world = receiver.point / scene_.scale + scene_.origin;
         for (const WalkedImage& walked : images_) {
@@ -236,14 +254,25 @@ private:
             if (light_.sphere && !light_.coincident()) disc_axes(centre.normalized(), half_u.length(), half_u, half_v);
             const DepthVector from{static_cast<float>(start.x), static_cast<float>(start.y), static_cast<float>(start.z)};
             for (int i = 0; i < packet; ++i) {
-                if (!valid[i] || tfar[i] < 0) continue;
+                if (!valid[i] || (tfar[i] < 0 && !followed)) continue;
                 const Vec3 way = centre + half_u * static_cast<double>(x[i]) + half_v * static_cast<double>(y[i]);
                 const DepthVector along{static_cast<float>(way.x), static_cast<float>(way.y), static_cast<float>(way.z)};
                 const DepthLine line = depth_line(image.view, from, along, light_.frame.directional, DEPTH_OWN_PIXELS);
-                if (depth_walk(image.view, image.pixels.data(), image.nearest.data(), DEPTH_LEVELS, line, 0, 0).blocked)
-                    tfar[i] = -std::numeric_limits<float>::infinity();
+                const DepthMet met = depth_walk(image.view, image.pixels.data(), image.nearest.data(), DEPTH_LEVELS, line, followed != nullptr, 0);
+                if (met.blocked) tfar[i] = -std::numeric_limits<float>::infinity();
+                if (!followed) continue;
+                followed->crossed[i] |= met.crossed != 0;
+                followed->behind[i] |= met.behind != 0;
+                followed->left[i] |= met.left != 0;
             }
         }
+    }
+
+    void count_followed(const Tally& tally)
+    {
+        followed_ += static_cast<std::uint64_t>(tally.rays);
+        behind_ += static_cast<std::uint64_t>(tally.unknown);
+        left_ += static_cast<std::uint64_t>(tally.left);
     }
 
     Tally cast(const Receiver& receiver, const Strata& strata, SampleKey key) const;
@@ -257,7 +286,7 @@ private:
     const SeenScene& seen_;
     std::vector<WalkedImage> images_;
     VisibilityResult result_;
-    std::atomic<std::uint64_t> rays_{0};
+    std::atomic<std::uint64_t> rays_{0}, followed_{0}, behind_{0}, left_{0};
 };
 
 Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey key) const
@@ -271,6 +300,7 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
     const float end = light_.frame.directional ? std::numeric_limits<float>::infinity() : 1.f;
 
     const Imath::V3f n(receiver.normal);
+    const bool follow = seen_.bounds || receiver.followed;
     const bool clipped = receiver.normal != Vec3(0, 0, 0);
     alignas(64) RTCRay16 rays;
     alignas(64) int valid[packet];
@@ -314,7 +344,20 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
             if (below) rays.tfar[i] = -std::numeric_limits<float>::infinity();
         }
         if (!scene_.triangles.empty()) rtcOccluded16(cast, scene_.scene, &context, &rays);
-        if (!images_.empty()) walk(receiver, x, y, cast, rays.tfar);
+        if (!images_.empty()) {
+            Followed followed;
+            int by_mesh[packet];
+            for (int i = 0; i < packet; ++i) by_mesh[i] = valid[i] != 0 && rays.tfar[i] < 0;
+            walk(receiver, x, y, cast, rays.tfar, follow ? &followed : nullptr);
+            for (int i = 0; i < packet && follow; ++i) {
+                const bool certain = by_mesh[i] || followed.crossed[i];
+                tally.certain += valid[i] != 0 && certain;
+                tally.unknown += valid[i] != 0 && !certain && followed.behind[i];
+                tally.left += valid[i] != 0 && !certain && followed.left[i];
+            }
+        } else if (follow) {
+            for (int i = 0; i < packet; ++i) tally.certain += valid[i] != 0 && rays.tfar[i] < 0;
+        }
 
         // Embree marks a blocked ray with tfar = -infinity.
         for (int i = 0; i < packet; ++i) tally.free += valid[i] != 0 && rays.tfar[i] >= 0;
@@ -333,6 +376,11 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
 
 void Visibility::store(int x, int y, const Tally& tally)
 {
+    if (seen_.bounds) {
+        const auto rays = static_cast<float>(tally.rays);
+        result_.bound.at(x, y, 0) = 1 - static_cast<float>(tally.certain + tally.unknown) / rays;
+        result_.bound.at(x, y, 1) = 1 - static_cast<float>(tally.certain) / rays;
+    }
     for (int c = 0; c < result_.visibility.channels; ++c) {
         // Samples that all met black texels weigh the same.
         const bool weighted = tally.sum[c] > 0;

@@ -48,6 +48,9 @@ struct Report {
 // Visibility of each receiver pixel, linear, 0 umbra to 1 fully lit; 1 channel, or 3 when the light is textured.
 struct Mask {
     Image visibility;
+    // The lowest and the highest visibility that each pixel can have, where depth images cast and what lies behind their surfaces is not
+    // known: two channels. Where it was asked for; else empty.
+    Image bound = {};
     Report report;
 };
 
@@ -163,7 +166,8 @@ public:
     // `prepared`; the masks have the bits of preparing anew. Throws what preparing throws where the technique takes no textured light.
     Prepared with_emission(const Prepared& prepared, const Image& emission) const;
 
-    Mask shade(const Prepared& prepared, const Receivers& receivers) const;
+    // bound: Mask::bound is wanted. Throws unsupported for a technique that has none (depth_trace and ray_traced have).
+    Mask shade(const Prepared& prepared, const Receivers& receivers, bool bound = false) const;
 
     // Device buffer to device buffer: `visibility` is float32, width * height, row-major. Returns when the work is queued on `queue` (of
     // this engine's context and device, in order).
