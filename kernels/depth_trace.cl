@@ -129,6 +129,8 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
 // The samples of a bundle, and vectors of them.
 #define BUNDLE 64
 #define GROUPS (BUNDLE / LANES)
+// Groups of 16 samples: 4 x 4 strata side by side.
+#define CLOSE_GROUPS (16 / LANES)
 
 #if LANES == 1
 typedef uint uintn;
@@ -176,11 +178,11 @@ inline float high_end(const float start, const float rate, const float s0, const
 }
 
 // The fan of lines that are not blocked yet. major: 0 for x, 1 for y; sign: the way that they all go along it.
-inline Fan fan_of(const Lines* lines, const int major, const float sign)
+inline Fan fan_of(const Lines* lines, const int groups, const int major, const float sign)
 {
     const floatn most = (floatn)(MAXFLOAT);
     floatn minor_low = most, minor_high = most, value_low = most, value_high = most, end = most;
-    for (int g = 0; g < GROUPS; ++g) {
+    for (int g = 0; g < groups; ++g) {
         const floatn along = sign * (major ? lines[g].step_y : lines[g].step_x), inverse = 1.0f / along;
         const floatn minor = (major ? lines[g].step_x : lines[g].step_y) * inverse, value = lines[g].step_value * inverse;
         const intn open = lines[g].blocked == 0;
@@ -214,10 +216,10 @@ inline float common_way(const Lines* lines, const int axis, float* slowest)
 }
 
 // Adds what a pixel blocks: depth_walk's test of a pixel, for every line of the bundle.
-inline void block_lines(Lines* lines, const DepthPixel pixel, const int cx, const int cy, const float base, const float own, const float x, const float y)
+inline void block_lines(Lines* lines, const int groups, const DepthPixel pixel, const int cx, const int cy, const float base, const float own, const float x, const float y)
 {
     const float deep = pixel.back + pixel.slack;
-    for (int g = 0; g < GROUPS; ++g) {
+    for (int g = 0; g < groups; ++g) {
         const floatn left = (float)cx - x, right = (float)(cx + 1) - x, top = (float)cy - y, bottom = (float)(cy + 1) - y;
         const intn ahead_x = lines[g].step_x >= 0.0f, ahead_y = lines[g].step_y >= 0.0f;
         const floatn near_x = select_lanes(right, left, ahead_x) * lines[g].inverse_x, far_x = select_lanes(left, right, ahead_x) * lines[g].inverse_x;
@@ -231,24 +233,25 @@ inline void block_lines(Lines* lines, const DepthPixel pixel, const int cx, cons
     }
 }
 
-inline int all_blocked(const Lines* lines)
+inline int all_blocked(const Lines* lines, const int groups)
 {
     intn together = lines[0].blocked;
-    for (int g = 1; g < GROUPS; ++g) together &= lines[g].blocked;
+    for (int g = 1; g < groups; ++g) together &= lines[g].blocked;
     return ALL(together != 0);
 }
 
-// Everything that the bundle's lines can meet, column by column along their common axis: blocks that lie behind all lines are passed over,
-// then pixels; the pixels that are left are tested against every line.
-inline void walk_bundle(const DepthView view, __global const DepthPixel* restrict pixels, __global const float* restrict nearest, const float x,
-                        const float y, const float value, const float own, const int major, const float sign, Lines* lines)
+// Everything that some lines can meet, column by column along their common axis from column m on: blocks that lie behind all of them are passed
+// over, or before all that they show, then pixels; the pixels that are left are tested against every line. With `probe` none is tested, and the walk ends at the first of them.
+// Returns the column where it ends; beyond the image when there is nothing more to meet.
+inline int walk_bundle(const DepthView view, __global const DepthPixel* restrict pixels, __global const float* restrict nearest, const float x,
+                        const float y, const float value, const float own, const int major, const float sign, int m, const int probe, const int groups, Lines* lines)
 {
-    const Fan fan = fan_of(lines, major, sign);
+    const Fan fan = fan_of(lines, groups, major, sign);
     const float start = major ? y : x, minor_start = major ? x : y;
     const int majors = major ? view.height : view.width, minors = major ? view.width : view.height;
     const int ahead = sign > 0.0f;
     const float steepest = 1.0f + fmax(fabs(fan.minor_low), fabs(fan.minor_high));
-    int m = clamp((int)floor(start), 0, majors - 1), entered = 1;
+    int entered = 1;
     while (m >= 0 && m < majors) {
         const float s0 = fmax(sign * ((float)(ahead ? m : m + 1) - start), 0.0f);
         if (s0 > fan.end) break;
@@ -265,12 +268,13 @@ inline void walk_bundle(const DepthView view, __global const DepthPixel* restric
             const int first = (int)fmax(low, 0.0f) / side, last = (int)fmin(high, (float)(minors - 1)) / side;
             const float lowest = low_end(value, fan.value_low, s0, s1);
             const float limit = lowest - 1e-6f * fabs(lowest);
-            int behind = last - first < 8;
-            for (int n = first; n <= last && behind; ++n) {
-                const int bx = major ? n : block, by = major ? block : n;
-                behind = nearest[view.level_offset[level] + by * view.level_width[level] + bx] < limit;
+            const float highest = high_end(value, fan.value_high, s0, s1), far_limit = highest + 1e-6f * fabs(highest);
+            int apart = last - first < 16;
+            for (int n = first; n <= last && apart; ++n) {
+                const int bx = major ? n : block, by = major ? block : n, at = view.level_offset[level] + by * view.level_width[level] + bx;
+                apart = nearest[at] < limit || nearest[view.blocks + at] > far_limit;
             }
-            if (!behind && (high >= 0.0f && low < (float)minors)) continue;
+            if (!apart && (high >= 0.0f && low < (float)minors)) continue;
             passed = 1;
             m = ahead ? border : border - 1;
         }
@@ -283,7 +287,18 @@ inline void walk_bundle(const DepthView view, __global const DepthPixel* restric
             const int first = (int)fmax(low_end(minor_start, fan.minor_low, s0, s1) - 0.01f, 0.0f);
             const int last = (int)fmin(high_end(minor_start, fan.minor_high, s0, s1) + 0.01f, (float)(minors - 1));
             int met = 0;
+            const float column_limit = low_end(value, fan.value_low, s0, s1) * (1.0f - 1e-6f);
+            const float column_far = high_end(value, fan.value_high, s0, s1) * (1.0f + 1e-6f);
             for (int n = first; n <= last; ++n) {
+                // The finest blocks of it that lie apart.
+                if (last - first > 8 && (n == first || n % DEPTH_BLOCK(DEPTH_LEVELS - 1) == 0)) {
+                    const int level = DEPTH_LEVELS - 1, side = DEPTH_BLOCK(level), bx = (major ? n : m) / side, by = (major ? m : n) / side;
+                    const int at = view.level_offset[level] + by * view.level_width[level] + bx;
+                    if (nearest[at] < column_limit || nearest[view.blocks + at] > column_far) {
+                        n = (n / side + 1) * side - 1;
+                        continue;
+                    }
+                }
                 const int cx = major ? n : m, cy = major ? m : n;
                 const DepthPixel pixel = pixels[cy * view.width + cx];
                 if (!(pixel.value > 0.0f)) continue;
@@ -293,13 +308,15 @@ inline void walk_bundle(const DepthView view, __global const DepthPixel* restric
                 const float across_low = across * fan.minor_low, across_high = across * fan.minor_high;
                 const float most = along + fmax(across_low, across_high) - fan.value_low, least = along + fmin(across_low, across_high) - fan.value_high;
                 if (high_end(base, most, s0, s1) <= 0.5f * pixel.slack || low_end(base, least, s0, s1) >= pixel.back + 2.0f * pixel.slack) continue;
-                block_lines(lines, pixel, cx, cy, base, own, x, y);
+                if (probe) return m;
+                block_lines(lines, groups, pixel, cx, cy, base, own, x, y);
                 met = 1;
             }
-            if (met && all_blocked(lines)) return;
+            if (met && all_blocked(lines, groups)) return -1;
         }
         m += ahead ? 1 : -1;
     }
+    return -1;
 }
 
 // The lines of a bundle's samples, those below the receiver's plane blocked. Returns whether they can be walked together.
@@ -400,14 +417,21 @@ __kernel void depth_trace_bundles(const DepthView view, const DepthLight light, 
     float slowest_x = 0.0f, slowest_y = 0.0f;
     if (inside) {
         bundle_lines(view, light, point, normal, centre, half_u, half_v, key, strata, step, first, lines);
-        if (!all_blocked(lines)) {
+        if (!all_blocked(lines, GROUPS)) {
             const float way_x = common_way(lines, 0, &slowest_x), way_y = common_way(lines, 1, &slowest_y);
             const int major = slowest_y > slowest_x;
-            if (slowest_x > 0.0f || slowest_y > 0.0f)
-                walk_bundle(view, pixels, nearest, x, y, depth_value(view, point.z), own, major, major ? way_y : way_x, lines);
+            if (slowest_x > 0.0f || slowest_y > 0.0f) {
+                // All together to the first pixel that any may meet; from there on the few that stay closest.
+                const float value = depth_value(view, point.z), sign = major ? way_y : way_x;
+                const int from = clamp((int)floor(major ? y : x), 0, (major ? view.height : view.width) - 1);
+                const int met = walk_bundle(view, pixels, nearest, x, y, value, own, major, sign, from, 1, GROUPS, lines);
+                for (int g = 0; g < GROUPS && met >= 0; g += CLOSE_GROUPS)
+                    if (!all_blocked(lines + g, CLOSE_GROUPS))
+                        walk_bundle(view, pixels, nearest, x, y, value, own, major, sign, met, 0, CLOSE_GROUPS, lines + g);
+            }
         }
     }
-    const int together = inside && (slowest_x > 0.0f || slowest_y > 0.0f || all_blocked(lines));
+    const int together = inside && (slowest_x > 0.0f || slowest_y > 0.0f || all_blocked(lines, GROUPS));
     for (int word = 0; word < BUNDLE / 32 && first + 32 * word < light.samples; ++word) {
         const int at = (first / 32 + word) * light.count + item;
         uint bits = blocked[at];

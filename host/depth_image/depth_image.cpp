@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "depth_image/thickness.hpp"
 #include "scene/parallel.hpp"
@@ -26,32 +27,39 @@ DepthView view_of(const Camera& camera, int width, int height)
         view.level_offset[level] = offset;
         offset += columns * rows;
     }
+    view.blocks = offset;
     return view;
 }
 
-// The greatest value that a line can meet in each block of each level.
+// The greatest and the least value that a line can meet in each block of each level.
 void build_pyramid(DepthImage& image)
 {
     const DepthView& view = image.view;
-    const int finest = DEPTH_BLOCK(DEPTH_LEVELS - 1), rows = (view.height + finest - 1) / finest;
-    image.nearest.assign(static_cast<std::size_t>(view.level_offset[DEPTH_LEVELS - 1]) +
-                             static_cast<std::size_t>(view.level_width[DEPTH_LEVELS - 1]) * static_cast<std::size_t>(rows),
-                         0.f);
-    const auto block = [&](int level, int x, int y) -> float& {
+    const auto blocks = static_cast<std::size_t>(view.blocks);
+    image.nearest.assign(2 * blocks, 0.f);
+    std::fill(image.nearest.begin() + view.blocks, image.nearest.end(), std::numeric_limits<float>::max());
+    const auto block = [&](int level, int x, int y) {
         const int side = DEPTH_BLOCK(level);
-        return image.nearest[static_cast<std::size_t>(view.level_offset[level]) +
-                             static_cast<std::size_t>(y / side) * static_cast<std::size_t>(view.level_width[level]) + static_cast<std::size_t>(x / side)];
+        return static_cast<std::size_t>(view.level_offset[level]) +
+               static_cast<std::size_t>(y / side) * static_cast<std::size_t>(view.level_width[level]) + static_cast<std::size_t>(x / side);
     };
     for (int y = 0; y < view.height; ++y)
         for (int x = 0; x < view.width; ++x) {
             const DepthPixel& pixel = image.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) + static_cast<std::size_t>(x)];
             if (!(pixel.value > 0)) continue;
             // The front's highest corner; more by what float32 may lose.
-            const float highest = (pixel.value + .5f * (std::abs(pixel.slope_x) + std::abs(pixel.slope_y))) * (1 + 0x1p-20f);
-            for (int level = 0; level < DEPTH_LEVELS; ++level) block(level, x, y) = std::max(block(level, x, y), highest);
+            const float half = .5f * (std::abs(pixel.slope_x) + std::abs(pixel.slope_y));
+            const float highest = (pixel.value + half) * (1 + 0x1p-20f);
+            // The back's lowest corner; what it may be off counts, too.
+            const float lowest = pixel.value - half - pixel.back - 2 * pixel.slack - 0x1p-20f * pixel.value;
+            for (int level = 0; level < DEPTH_LEVELS; ++level) {
+                float& nearest = image.nearest[block(level, x, y)];
+                float& furthest = image.nearest[blocks + block(level, x, y)];
+                nearest = std::max(nearest, highest);
+                furthest = std::min(furthest, lowest);
+            }
         }
-    image.view.nearest = 0;
-    for (const float value : image.nearest) image.view.nearest = std::max(image.view.nearest, value);
+    image.view.nearest = *std::max_element(image.nearest.begin(), image.nearest.begin() + view.blocks);
 }
 
 // How far behind a surface its back lies, in value.

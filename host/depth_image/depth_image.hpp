@@ -15,7 +15,7 @@ struct DepthImage {
     Camera camera;
     DepthView view{};
     std::vector<DepthPixel> pixels; // [height][width]
-    std::vector<float> nearest;     // the pyramid's levels, one after the other
+    std::vector<float> nearest;     // the pyramid: the greatest values of all levels' blocks, then the least
     DepthQuality quality;
 
     std::uint64_t bytes() const { return pixels.size() * sizeof(DepthPixel) + nearest.size() * sizeof(float); }

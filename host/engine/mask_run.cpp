@@ -110,7 +110,7 @@ private:
             const Camera camera = resolve_camera(complete.camera, light, {}, complete.width, complete.height, "receivers.camera");
             complete.surface = job_.geometry.state().surface_of_same(*complete.depth, camera);
             if (!complete.surface) complete.surface = surface_of(complete, camera, context);
-            stages.push_back({"fit depth", fitting.ms(), 0, 0});
+            stages.push_back({"fit receivers", fitting.ms(), 0, 0});
         }
         receivers_ = std::make_shared<const Receivers>(std::move(complete));
         keeper_.keep(receivers_);

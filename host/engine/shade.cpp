@@ -137,7 +137,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
         const std::vector<std::string> warnings = quality_warnings(surface->quality, "receivers.depth");
         mask.report.warnings.insert(mask.report.warnings.end(), warnings.begin(), warnings.end());
     }
-    if (surface && !receivers.surface) mask.report.stages.push_back({"fit depth", fit_ms, 0, 0});
+    if (surface && !receivers.surface) mask.report.stages.push_back({"fit receivers", fit_ms, 0, 0});
     opencl::Buffer<float> visibility;
     if (!row_of(mask.report.technique).on_host)
         visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");

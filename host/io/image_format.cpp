@@ -65,7 +65,7 @@ ImageFormat format_of(const OutputFormat& output)
 OutputFormat checked(const OutputFormat& output, std::string_view where)
 {
     const std::string prefix = where.empty() ? std::string() : std::string(where) + ": ";
-    OutputFormat result{lower(output.format), output.bits};
+    OutputFormat result{lower(output.format), output.bits, output.channels};
     const WrittenFormat* found = find(result.format);
     if (!found && result.format.empty()) throw Error(ErrorCode::usage, prefix + "no image format given", std::string(formats_hint));
     if (!found) throw Error(ErrorCode::usage, prefix + "unknown image format \"" + output.format + "\"", std::string(formats_hint));

@@ -97,6 +97,7 @@ MapEncoding parse_encoding(const JsonValue& value)
     if (const auto near = section.find("near")) result.depth.near = near->number();
     if (const auto far = section.find("far")) result.depth.far = far->number();
     if (const auto scale = section.find("scale")) result.depth.scale = scale->number();
+    if (const auto shift = section.find("shift")) result.depth.shift = shift->number();
     if (const auto precision = section.find("precision")) result.depth.precision = precision->number();
     if (const auto empty = section.find("empty")) result.depth.empty = empty->number();
     if (const auto channel = section.find("channel")) result.channel = channel->text();

@@ -273,7 +273,7 @@ const Object& scene()
                    {.name = "technique",
                     .type = TechniqueKeys{},
                     .meaning = "how the mask is computed",
-                    .fallback = R"({"kind": "soft_shadow_map"})",
+                    .otherwise = "`soft_shadow_map`; where all that casts is depth objects, `depth_trace`",
                     .example = R"({"kind": "ray_traced"})"},
                    {.name = "output",
                     .type = One{output},

@@ -112,7 +112,7 @@ OutputFormat SceneDocument::output() const
 TechniqueRequest SceneDocument::technique() const
 {
     const auto value = state_->root().find("technique");
-    return value ? parse_technique(*value) : TechniqueRequest{};
+    return value ? parse_technique(*value) : default_technique(state_->root());
 }
 
 Scene SceneDocument::lights(const Resources& resources) const

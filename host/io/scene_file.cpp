@@ -61,6 +61,22 @@ OutputFormat parse_output(const JsonValue& value)
     }
 }
 
+TechniqueRequest default_technique(const JsonObject& root)
+{
+    const auto objects = root.find("objects");
+    if (!objects || !objects->json().is_array()) return {};
+    bool depth = false, other = false;
+    for (const JsonValue& object : objects->elements()) {
+        if (!object.json().is_object()) continue;
+        const auto casts = object.json().find("casts");
+        if (casts != object.json().end() && *casts == false) continue;
+        (object.json().contains("depth") ? depth : other) = true;
+    }
+    TechniqueRequest request;
+    if (depth && !other) request.kind = "depth_trace";
+    return request;
+}
+
 Bytes FileResources::bytes(const std::string& name) const { return Bytes(read_file(path(name), name)); }
 
 std::string FileResources::path(const std::string& name) const { return (std::filesystem::path(folder_) / name).string(); }
@@ -79,6 +95,8 @@ Scene parse_scene(std::string_view json, const Resources& resources)
     if (const auto technique = root.find("technique")) {
         scene.technique = parse_technique(*technique);
         technique_from(scene.technique); // for its errors, which name the key
+    } else {
+        scene.technique = default_technique(root);
     }
     parse_lights(root, resources, scene);
     check_shared_views(root);

@@ -58,6 +58,7 @@ Receivers parse_receivers(const JsonValue& value, const Light& light, const Reso
 
 // Technique and output (scene_file.cpp).
 TechniqueRequest parse_technique(const JsonValue& value);
+TechniqueRequest default_technique(const JsonObject& root); // of a scene that names none
 OutputFormat parse_output(const JsonValue& value);
 
 // Objects (scene_objects.cpp).

@@ -39,7 +39,7 @@ void check_range(const DepthEncoding& encoding, const std::string& where)
 
 void check_type(const RawDepth& raw, const DepthEncoding& encoding, const std::string& where, std::vector<std::string>& warnings)
 {
-    if (raw.type == SampleType::uint8 && !in_unit_range(encoding.kind))
+    if (raw.type == SampleType::uint8 && !in_unit_range(encoding.kind) && encoding.kind != EncodingKind::disparity)
         throw Error(ErrorCode::invalid_input, where + " is 8-bit; depth needs 16-bit or float",
                     "use EXR float32, or encoding \"normalized\" with near and far");
     if (raw.type == SampleType::uint8) warnings.push_back(where + " is 8-bit: 256 depths at most, shadows will show steps");
@@ -64,7 +64,7 @@ double decode(double value, const DepthEncoding& encoding)
     case EncodingKind::radial:
         return value;
     case EncodingKind::disparity:
-        return 1 / value;
+        return encoding.shift ? 1 / (value * encoding.scale + *encoding.shift) : 1 / value;
     case EncodingKind::window:
         return 1 / (1 / near + value * (inverse_far - 1 / near));
     case EncodingKind::reversed_window:
@@ -112,7 +112,7 @@ DepthStep step_of(const RawDepth& raw, const DepthEncoding& encoding)
     case EncodingKind::planar:
     case EncodingKind::radial: step.depth = unit * scale; break;
     case EncodingKind::normalized: step.depth = unit * scale * std::abs(*encoding.far - *encoding.near); break;
-    case EncodingKind::disparity: step.disparity = unit / scale; break;
+    case EncodingKind::disparity: step.disparity = encoding.shift ? unit * scale : unit / scale; break;
     case EncodingKind::window:
     case EncodingKind::reversed_window: step.disparity = unit * std::abs(1 / *encoding.near - inverse_far) / scale; break;
     }
@@ -167,7 +167,7 @@ DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& h
             throw Error(ErrorCode::invalid_input, at + ": has a stored value of " + std::to_string(value),
                         "expected 0 to 1 in this encoding");
         on_far_plane += encoding.kind == EncodingKind::window && value == 1;
-        double depth = decode(value, encoding) * encoding.scale;
+        double depth = decode(value, encoding) * (encoding.shift ? 1 : encoding.scale);
         if (encoding.kind == EncodingKind::radial) {
             const double x = (2 * (static_cast<double>(i % static_cast<std::size_t>(raw.width)) + 0.5) / raw.width - 1) * half_extent.x;
             const double y = (1 - 2 * (static_cast<double>(i / static_cast<std::size_t>(raw.width)) + 0.5) / raw.height) * half_extent.y;

@@ -16,6 +16,7 @@ struct DepthEncoding {
     std::optional<double> near, far;
     double scale = 1; // multiplies the decoded depth
     std::optional<double> empty;
+    std::optional<double> shift; // disparity alone: 1 / depth = value scale + shift; without it, depth = scale / value
     std::optional<double> precision; // standard error of a depth over the depth; without it, estimated from the image
 };
 

@@ -18,7 +18,7 @@
 #define DEPTH_FUNCTION inline
 #endif
 
-// Sides of the pyramid's blocks, coarse to fine; each level keeps the greatest value that a line can meet in its block.
+// Sides of the pyramid's blocks, coarse to fine; each level keeps the greatest and the least value that a line can meet in its block.
 #define DEPTH_LEVELS 3
 #define DEPTH_BLOCK(level) (64 >> (2 * (level)))
 
@@ -33,6 +33,7 @@ typedef struct {
     float far;                // orthographic: value = far - z
     int orthographic;
     int level_width[DEPTH_LEVELS], level_offset[DEPTH_LEVELS]; // blocks in a row of each level; where the level begins
+    int blocks;               // of all levels: from there on the pyramid has the least value of each block's backs
 } DepthView;
 
 // What a line meets in a pixel. value 0: nothing.
