@@ -35,7 +35,10 @@ __kernel void depth_planes(const int2 size, const int stride, const int reach, _
     if (x >= size.x || y >= size.y) return;
     const int at = (y + DEPTH_PAD) * stride + x + DEPTH_PAD;
     const float own = value[at], error = sigma[at], per_reach = 0.6f / (reach * reach);
-    float plane = own, sx = smaller_step(value[at - 1], own, value[at + 1]), sy = smaller_step(value[at - stride], own, value[at + stride]);
+    // Over a wider step where the window is wide: noise bends the first slope less.
+    const int far = reach > 2 ? reach / 2 : 1;
+    float plane = own;
+    float sx = smaller_step(value[at - far], own, value[at + far]) / far, sy = smaller_step(value[at - far * stride], own, value[at + far * stride]) / far;
     float rms = 0.0f, number = 1.0f;
 
     for (int turn = 0; turn < 4; ++turn) {

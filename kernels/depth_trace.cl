@@ -111,7 +111,7 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
                 continue;
             }
             const DepthVector direction = {way.x, way.y, way.z};
-            const DepthLine line = depth_line(view, start, direction, light.endless, light.own ? DEPTH_OWN_PIXELS : 0.0f);
+            const DepthLine line = depth_line(view, start, direction, light.endless, light.own);
             const DepthMet met = depth_walk(view, pixels, nearest, DEPTH_LEVELS, line, bounds, 0);
             bits |= met.blocked ? bit : 0;
             sure |= met.crossed ? bit : 0;
@@ -218,7 +218,7 @@ inline float common_way(const Lines* lines, const int axis, float* slowest)
 // Adds what a pixel blocks: depth_walk's test of a pixel, for every line of the bundle.
 inline void block_lines(Lines* lines, const int groups, const DepthPixel pixel, const int cx, const int cy, const float base, const float own, const float x, const float y)
 {
-    const float deep = pixel.back + pixel.slack;
+    const float deep = pixel.back + pixel.slack, clear = depth_own(own, base, pixel.slack, pixel.slope_x, pixel.slope_y, pixel.value);
     for (int g = 0; g < groups; ++g) {
         const floatn left = (float)cx - x, right = (float)(cx + 1) - x, top = (float)cy - y, bottom = (float)(cy + 1) - y;
         const intn ahead_x = lines[g].step_x >= 0.0f, ahead_y = lines[g].step_y >= 0.0f;
@@ -229,7 +229,7 @@ inline void block_lines(Lines* lines, const int groups, const DepthPixel pixel, 
         const floatn rise = pixel.slope_x * lines[g].step_x + pixel.slope_y * lines[g].step_y - lines[g].step_value;
         const floatn a = base + begin * rise, b = base + end * rise;
         const floatn high = select_lanes(b, a, a > b), low = select_lanes(a, b, a > b);
-        lines[g].blocked |= (begin <= end) & (high > pixel.slack) & (low < deep) & (begin * lines[g].speed >= own);
+        lines[g].blocked |= (begin <= end) & (high > pixel.slack) & (low < deep) & (begin * lines[g].speed >= clear);
     }
 }
 
@@ -411,7 +411,7 @@ __kernel void depth_trace_bundles(const DepthView view, const DepthLight light, 
     const int before = view.orthographic || point.z >= 0.5f / view.nearest;
     const float x = point.x / spread / view.pixel_x + view.middle_x, y = view.middle_y - point.y / spread / view.pixel_y;
     const int inside = before && x >= 0.0f && y >= 0.0f && x < (float)view.width && y < (float)view.height;
-    const float own = light.own ? DEPTH_OWN_PIXELS : 0.0f;
+    const float own = light.own;
 
     Lines lines[GROUPS];
     float slowest_x = 0.0f, slowest_y = 0.0f;

@@ -109,6 +109,13 @@ Vec3 direction_from_world(const Camera& camera, const Vec3& d)
 
 Vec3 camera_from_world(const Camera& camera, const Vec3& point) { return direction_from_world(camera, point - camera.frame.origin); }
 
+// Whether one camera's pixels are the other's receivers, all but for the rounding of how its place was written.
+bool same_place(const Camera& a, const Camera& b)
+{
+    const Frame &p = a.frame, &q = b.frame;
+    return (p.origin - q.origin).length() <= 1e-6 * (1 + p.origin.length()) && (p.z - q.z).length() < 1e-6 && (p.y - q.y).length() < 1e-6;
+}
+
 DepthSurface depth_surface(const DepthFit& fit, const Camera& camera)
 {
     DepthSurface surface{.width = fit.width, .height = fit.height, .camera = camera, .points = {}, .normals = {}, .depth = {}, .quality = fit.quality};

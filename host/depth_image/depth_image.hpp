@@ -39,6 +39,9 @@ struct DepthSurface {
 // the depth.
 DepthSurface depth_surface(const DepthFit& fit, const Camera& camera);
 
+// Whether one camera's pixels are the other's receivers, all but for the rounding of how its place was written.
+bool same_place(const Camera& a, const Camera& b);
+
 // From the camera's coordinates to the world and back.
 Vec3 world_from_camera(const Camera& camera, const Vec3& point);
 Vec3 camera_from_world(const Camera& camera, const Vec3& point);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <penumbra/error.hpp>
@@ -13,8 +14,54 @@ namespace {
 struct LightBox {
     Imath::Box3d box;    // in light space
     Vec2 tangent{0, 0};  // largest |x / z| and |y / z| of what lies before the light
-    std::string crosses; // the first object with a triangle through the light's plane; empty: none
+    bool crosses = false; // a triangle reaches through the light's plane
 };
+
+// A plane: points where normal . p = offset.
+struct Plane {
+    Vec3 normal{0, 0, 0};
+    double offset = 0;
+};
+
+// The plane that a mesh lies in, to a hundred-thousandth of its size; nothing when it lies in none.
+std::optional<Plane> plane_of(const TriangleMesh& mesh)
+{
+    if (mesh.triangles.empty()) return {};
+    Vec3 normal(0, 0, 0);
+    for (const auto& [a, b, c] : mesh.triangles) {
+        const Vec3 n = (Vec3(mesh.positions[b]) - Vec3(mesh.positions[a])).cross(Vec3(mesh.positions[c]) - Vec3(mesh.positions[a]));
+        if (n.length() > normal.length()) normal = n;
+    }
+    if (!(normal.length() > 0)) return {};
+    Plane plane{normal.normalized(), 0};
+    plane.offset = plane.normal.dot(Vec3(mesh.positions[mesh.triangles.front()[0]]));
+    const double tolerance = 1e-5 * (bounds(mesh).max - bounds(mesh).min).length();
+    for (const Imath::V3f& p : mesh.positions)
+        if (std::abs(plane.normal.dot(Vec3(p)) - plane.offset) > tolerance) return {};
+    return plane;
+}
+
+// Whether a plane object has everything else on the light's side: it casts on no object. Points of depth that was given are not looked at.
+bool is_ground(const Object& object, const LightFrame& light, const std::vector<Object>& objects)
+{
+    if (object.seen || light.directional) return false;
+    const auto plane = plane_of(object.mesh);
+    if (!plane) return false;
+    const double side = plane->normal.dot(light.origin) - plane->offset > 0 ? 1 : -1;
+    const auto before = [&](const Vec3& p) { return side * (plane->normal.dot(p) - plane->offset) >= -1e-5 * (1 + p.length()); };
+    for (const Object& other : objects) {
+        if (&other == &object) continue;
+        for (const Imath::V3f& p : other.mesh.positions)
+            if (!before(Vec3(p))) return false;
+        if (!other.seen) continue;
+        const SeenSurface& seen = *other.seen;
+        for (int y = 0; y < seen.depth.height; ++y)
+            for (int x = 0; x < seen.depth.width; ++x)
+                if (std::isfinite(seen.depth.at(x, y)) && !before(world_point(seen.camera, seen.depth.width, seen.depth.height, x + .5, y + .5, seen.depth.at(x, y))))
+                    return false;
+    }
+    return true;
+}
 
 // What of an image's pixels is fitted to: all but the outermost half a per cent each way, where stray pixels lie.
 constexpr double fitted_share = .995;
@@ -43,27 +90,39 @@ void add_seen(LightBox& result, const LightFrame& light, const SeenSurface& seen
     result.tangent = {std::max(result.tangent.x, quantile(x)), std::max(result.tangent.y, quantile(y))};
 }
 
-LightBox light_box(const LightFrame& light, const std::vector<Object>& objects)
+// What reaches through the light's plane spans any field of view: its tangents count up to this.
+constexpr double widest = 8;
+
+void add_mesh(LightBox& result, const LightFrame& light, const Object& object)
+{
+    for (const auto& triangle : object.mesh.triangles) {
+        Vec3 corner[3];
+        int before = 0;
+        for (int i = 0; i < 3; ++i) {
+            corner[i] = light_from_world(light, Vec3(object.mesh.positions[triangle[static_cast<std::size_t>(i)]]));
+            before += corner[i].z > 0;
+            result.box.extendBy(corner[i]);
+        }
+        // What lies wholly behind the light matters to nobody.
+        if (before == 0) continue;
+        if (before < 3) {
+            result.crosses = true;
+            result.tangent = {std::max(result.tangent.x, widest), std::max(result.tangent.y, widest)};
+            continue;
+        }
+        for (const Vec3& c : corner)
+            result.tangent = {std::max(result.tangent.x, std::abs(c.x / c.z)), std::max(result.tangent.y, std::abs(c.y / c.z))};
+    }
+}
+
+LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, bool without_ground)
 {
     LightBox result;
     for (const Object& object : objects) {
         if (!object.casts && !object.receives) continue;
+        if (without_ground && is_ground(object, light, objects)) continue;
         if (object.seen) add_seen(result, light, *object.seen);
-        for (const auto& triangle : object.mesh.triangles) {
-            Vec3 corner[3];
-            int before = 0;
-            for (int i = 0; i < 3; ++i) {
-                corner[i] = light_from_world(light, Vec3(object.mesh.positions[triangle[static_cast<std::size_t>(i)]]));
-                before += corner[i].z > 0;
-                result.box.extendBy(corner[i]);
-            }
-            // What lies wholly behind the light matters to nobody; what reaches through its plane spans any field of view.
-            if (before == 0) continue;
-            if (before < 3 && result.crosses.empty()) result.crosses = object.name;
-            for (const Vec3& c : corner)
-                if (c.z > 0)
-                    result.tangent = {std::max(result.tangent.x, std::abs(c.x / c.z)), std::max(result.tangent.y, std::abs(c.y / c.z))};
-        }
+        add_mesh(result, light, object);
     }
     return result;
 }
@@ -79,7 +138,7 @@ Vec2 with_margin(const Vec2& half, int width, int height)
 Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height,
                std::string_view where)
 {
-    const LightBox fit = light_box(light, objects);
+    const LightBox fit = light_box(light, objects, false);
     if (!spec.half_extent && fit.box.isEmpty())
         throw Error::at(ErrorCode::invalid_input, std::string(where) + ".half_extent", "is missing and there are no objects to fit it to",
                         "expected two positive lengths");
@@ -107,13 +166,14 @@ Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::ve
     if (spec.tan_half_fov) return light_camera(light, *spec.tan_half_fov, light.origin);
 
     const std::string key = std::string(where) + ".tan_half_fov";
-    const LightBox fit = light_box(light, objects);
+    // Where something reaches through the light's plane, ground that casts on nothing need not be on the map.
+    LightBox fit = light_box(light, objects, false);
+    if (fit.crosses) {
+        const LightBox less = light_box(light, objects, true);
+        if (less.tangent.x > 0 || less.tangent.y > 0) fit = less;
+    }
     if (fit.tangent.x == 0 && fit.tangent.y == 0)
         throw Error::at(ErrorCode::invalid_input, key, "is missing and there is nothing before the light to fit it to",
-                        "expected two positive tangents");
-    if (!fit.crosses.empty())
-        throw Error::at(ErrorCode::invalid_input, key,
-                        "is missing and cannot be fitted: " + fit.crosses + " reaches through the light's plane",
                         "expected two positive tangents");
     return light_camera(light, with_margin(fit.tangent, width, height), light.origin);
 }

@@ -31,7 +31,7 @@ DepthLight light_for(const PreparedDepthTrace& prepared, const Camera& image, co
     DepthLight light = depth_light(prepared.light, image, receivers);
     light.samples = prepared.samples;
     light.has_normals = has_normals;
-    light.own = 1;
+    light.own = same_place(image, receivers) ? DEPTH_OWN_PIXELS : DEPTH_OWN_PLANE;
     const auto seed = static_cast<std::uint64_t>(prepared.settings.seed);
     light.seed_low = std::bit_cast<int>(static_cast<std::uint32_t>(seed));
     light.seed_high = std::bit_cast<int>(static_cast<std::uint32_t>(seed >> 32));

@@ -77,6 +77,7 @@ struct Receiver {
 // A depth image among the casters, and the light as its camera sees it.
 struct WalkedImage {
     const DepthImage* image;
+    float own;                   // DepthLine::own
     Vec3 centre, half_u, half_v; // image camera's coordinates; the direction to a directional light
 };
 
@@ -113,6 +114,7 @@ public:
             const Camera& to = image->camera;
             const LightFrame& frame = light.frame;
             images_.push_back({.image = image.get(),
+                               .own = same_place(to, camera) ? DEPTH_OWN_PIXELS : DEPTH_OWN_PLANE,
                                .centre = frame.directional ? direction_from_world(to, -frame.direction) : camera_from_world(to, frame.origin),
                                .half_u = direction_from_world(to, frame.u * frame.half_u),
                                .half_v = direction_from_world(to, frame.v * frame.half_v)});
@@ -257,7 +259,7 @@ private:
                 if (!valid[i] || (tfar[i] < 0 && !followed)) continue;
                 const Vec3 way = centre + half_u * static_cast<double>(x[i]) + half_v * static_cast<double>(y[i]);
                 const DepthVector along{static_cast<float>(way.x), static_cast<float>(way.y), static_cast<float>(way.z)};
-                const DepthLine line = depth_line(image.view, from, along, light_.frame.directional, DEPTH_OWN_PIXELS);
+                const DepthLine line = depth_line(image.view, from, along, light_.frame.directional, walked.own);
                 const DepthMet met = depth_walk(image.view, image.pixels.data(), image.nearest.data(), DEPTH_LEVELS, line, followed != nullptr, 0);
                 if (met.blocked) tfar[i] = -std::numeric_limits<float>::infinity();
                 if (!followed) continue;

@@ -22,8 +22,10 @@
 #define DEPTH_LEVELS 3
 #define DEPTH_BLOCK(level) (64 >> (2 * (level)))
 
-// Hits nearer to the receiver than this many pixels (|dx| + |dy|) are its own surface.
+// Hits nearer to the receiver than this many pixels (|dx| + |dy|) are its own surface, where receivers are the image's own pixels. Elsewhere,
+// where they lie anywhere on what the image shows: hits nearer than this on a surface whose plane they lie on. Written as a negative number.
 #define DEPTH_OWN_PIXELS 2.0f
+#define DEPTH_OWN_PLANE -4.0f
 
 typedef struct {
     int width, height;
@@ -77,7 +79,7 @@ typedef struct {
     int samples;
     int first, count;              // of the receivers that this launch is for, and how many
     int has_normals;
-    int own;                       // receivers lie on the image's own surfaces
+    float own;                     // hits nearer to the receiver than so many pixels do not count
     int seed_low, seed_high;       // of the samples
 } DepthLight;
 
@@ -87,6 +89,13 @@ typedef struct {
     float pixel_x, pixel_y; // tangents of a pixel of the view; lengths where it is orthographic
     int width, height, orthographic;
 } DepthSight;
+
+// From how far on hits on a pixel count. base: how far behind the pixel's plane the receiver lies.
+DEPTH_FUNCTION float depth_own(const float own, const float base, const float slack, const float slope_x, const float slope_y, const float value)
+{
+    if (own >= 0.0f) return own;
+    return fabs(base) <= slack + fabs(slope_x) + fabs(slope_y) + 2e-4f * value ? -own : 0.0f;
+}
 
 DEPTH_FUNCTION float depth_value(const DepthView view, const float z)
 {
@@ -247,7 +256,7 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
             const float base = value + slope_x * (line.x - (float)cx - 0.5f) + slope_y * (line.y - (float)cy - 0.5f) - line.value;
             const float rise = slope_x * line.step_x + slope_y * line.step_y - line.step_value;
             const float a = base + begin * rise, b = base + end * rise;
-            if (begin * speed >= line.own) {
+            if (begin * speed >= depth_own(line.own, base, slack, slope_x, slope_y, value)) {
                 const int hit = fmax(a, b) > slack && fmin(a, b) < back + slack;
                 if (through) {
                     // Where the line is between front and back, within the pixel.
