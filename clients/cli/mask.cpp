@@ -11,6 +11,7 @@
 
 #include "files.hpp"
 #include "mask_files.hpp"
+#include "preview.hpp"
 #include "opencl/quirks.hpp"
 #include "progress.hpp"
 #include "remote.hpp"
@@ -23,7 +24,7 @@ namespace penumbra::cli {
 namespace {
 
 struct Flags {
-    std::string scene, mask, report, bound, device, server;
+    std::string scene, mask, report, bound, over, preview, device, server;
     MaskChoice choice;
     TechniqueFlags technique;
 };
@@ -68,6 +69,16 @@ std::vector<MaskFile> check_files(const Flags& flags)
         require_place_for(flags.report, "--report");
         require_different(flags.report, "--report", flags.scene, "SCENE.json");
     }
+    if (flags.over.empty() != flags.preview.empty())
+        throw Error(ErrorCode::usage, flags.over.empty() ? "--preview: is given without --over" : "--over: is given without --preview",
+                    "expected both: --over PICTURE --preview OUT.png");
+    if (!flags.preview.empty()) {
+        require_place_for(flags.preview, "--preview");
+        for (const auto& [file, flag] : {std::pair(flags.scene, "SCENE.json"), std::pair(flags.mask, "-o"), std::pair(flags.over, "--over")})
+            require_different(flags.preview, "--preview", file, flag);
+        if (format_for(flags.preview, {}, "--preview").format != "png")
+            throw Error(ErrorCode::usage, "--preview " + flags.preview + ": is no PNG file", "expected a name that ends in .png");
+    }
     if (!flags.bound.empty()) {
         require_place_for(flags.bound, "--bound");
         require_different(flags.bound, "--bound", flags.scene, "SCENE.json");
@@ -98,6 +109,8 @@ int run(const Flags& flags)
 {
     // Refuse in order of cost: names, then the scene, then the device, then the work.
     const std::vector<MaskFile> files = check_files(flags);
+    if (!flags.server.empty() && !flags.preview.empty())
+        throw Error(ErrorCode::usage, "--preview " + flags.preview + ": does not go with --server");
     if (!flags.server.empty() && !flags.bound.empty())
         throw Error(ErrorCode::usage, "--bound " + flags.bound + ": does not go with --server", "POST to /v1/masks?result=bound in its place");
     if (!flags.server.empty()) return run_on_server(flags, files);
@@ -118,6 +131,11 @@ int run(const Flags& flags)
     progress.step("opening the device");
     const Engine engine = opening.get();
 
+    Image picture;
+    if (!flags.over.empty()) {
+        progress.step("reading " + flags.over);
+        picture = read_picture(flags.over);
+    }
     std::vector<FileReport> reports;
     std::vector<std::string> warnings;
     progress.step("computing the mask by " + scene.technique.kind);
@@ -125,6 +143,11 @@ int run(const Flags& flags)
         const std::string file = mask_file(flags.mask, named.light, named.frame);
         progress.step("writing " + file);
         write_image(file, named.mask.visibility, format);
+        if (!flags.preview.empty()) {
+            const std::string preview = mask_file(flags.preview, named.light, named.frame);
+            progress.step("writing " + preview);
+            write_image(preview, under_light(picture, named.mask.visibility, flags.over), {.format = "png", .bits = 8});
+        }
         if (!flags.bound.empty()) {
             const std::string bound = mask_file(flags.bound, named.light, named.frame);
             progress.step("writing " + bound);
@@ -164,6 +187,8 @@ Verb mask_verb(CLI::App& program)
     app->add_option("--bound", flags->bound,
                     "the lowest and the highest visibility that each pixel can have (channels low, high), where depth\nimages cast and what lies behind them is not known; by depth_trace or ray_traced")
         ->option_text("BOUND.exr");
+    app->add_option("--over", flags->over, "a picture of the mask's size and view, for --preview: EXR, TIFF, PNG, HDR or JPEG")->option_text("PICTURE");
+    app->add_option("--preview", flags->preview, "that picture under this light alone, to look at: times the mask, in linear light")->option_text("OUT.png");
     app->add_option("--light", flags->choice.light, "of several lights, the mask of this one alone")->option_text("NAME");
     app->add_option("--frame", flags->choice.frame, "of a sequence, the masks of this frame alone, from 1")
         ->option_text("N")

@@ -27,6 +27,8 @@ Error broken(std::string_view where, const std::string& what, std::string hint =
 ImageFormat format_from(std::span<const std::byte> bytes, std::string_view where)
 {
     const ImageFormat format = sniff(bytes);
+    if (format == ImageFormat::jpeg)
+        throw broken(where, "is a JPEG, which changes every number that it stores", "EXR, TIFF, PNG, PFM and Radiance HDR are read");
     if (format == ImageFormat::unknown)
         throw broken(where, bytes.empty() ? "is empty" : "is not an image of a known format",
                      "EXR, TIFF, PNG, PFM and Radiance HDR are read");
@@ -154,5 +156,12 @@ RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view cha
 }
 
 Image read_image(const std::string& path) { return decode_image(read_file(path, path), path); }
+
+Image read_picture(const std::string& path)
+{
+    const std::vector<std::byte> bytes = read_file(path, path);
+    if (sniff(bytes) != ImageFormat::jpeg) return decode_image(bytes, path);
+    return openimageio().decode_image(bytes, ImageFormat::jpeg, path, max_image_samples);
+}
 
 } // namespace penumbra

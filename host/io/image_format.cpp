@@ -52,6 +52,7 @@ ImageFormat sniff(std::span<const std::byte> bytes)
     if (text.starts_with("\x89PNG\r\n\x1a\n"sv)) return ImageFormat::png;
     if ((text.starts_with("PF"sv) || text.starts_with("Pf"sv)) && text.size() > 2 && std::isspace(static_cast<unsigned char>(text[2])))
         return ImageFormat::pfm;
+    if (text.starts_with("\xff\xd8\xff"sv)) return ImageFormat::jpeg;
     if (text.starts_with("#?RADIANCE"sv) || text.starts_with("#?RGBE"sv)) return ImageFormat::hdr;
     return ImageFormat::unknown;
 }
@@ -94,6 +95,7 @@ std::string_view image_format_of(std::span<const std::byte> bytes)
     case ImageFormat::png: return "png";
     case ImageFormat::pfm: return "pfm";
     case ImageFormat::hdr: return "hdr";
+    case ImageFormat::jpeg:
     case ImageFormat::unknown: break;
     }
     return {};

@@ -13,7 +13,7 @@ namespace penumbra {
 // No deflate stream becomes more than this many times longer (zlib's documentation).
 constexpr std::size_t most_inflated = 1032;
 
-enum class ImageFormat { unknown, exr, tiff, png, pfm, hdr };
+enum class ImageFormat { unknown, exr, tiff, png, pfm, hdr, jpeg }; // jpeg: pictures to look at, never depth
 
 // By the first bytes.
 ImageFormat sniff(std::span<const std::byte> bytes);

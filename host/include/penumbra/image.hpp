@@ -48,6 +48,9 @@ PENUMBRA_API std::string_view image_format_of(std::span<const std::byte> bytes);
 // Throws not_found, invalid_input (truncated, no such format, deep, more than 4 channels), too_large.
 PENUMBRA_API Image read_image(const std::string& path);
 
+// The same, and JPEG: a picture that masks are laid over.
+PENUMBRA_API Image read_picture(const std::string& path);
+
 // Writes to a temporary file beside `path` and renames it into place when whole. Throws usage for a format or bits that do not exist,
 // output when it cannot be written.
 PENUMBRA_API void write_image(const std::string& path, const Image& image, const OutputFormat& format = {});

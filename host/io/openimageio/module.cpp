@@ -15,6 +15,8 @@ std::string plugin(ImageFormat format)
         return "tiff";
     case ImageFormat::hdr:
         return "hdr";
+    case ImageFormat::jpeg:
+        return "jpeg";
     default:
         return {};
     }
