@@ -8,7 +8,7 @@
 #ifndef PENUMBRA_COMMON_DEPTH_WALK_H
 #define PENUMBRA_COMMON_DEPTH_WALK_H
 
-#ifdef __OPENCL_VERSION__
+#if defined(__OPENCL_VERSION__) || defined(__OPENCL_C_VERSION__) // the second: of a compiler without a device
 #pragma OPENCL FP_CONTRACT OFF
 #define DEPTH_MEMORY __global const
 #define DEPTH_FUNCTION inline
