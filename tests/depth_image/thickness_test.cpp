@@ -166,9 +166,19 @@ TEST(Membrane, OfABallMirrorsIt)
     const double expected = 2 * (3 - 9. / 10);
     const std::size_t middle = fit.index(120, 90);
     const double found = 2 * (1 / static_cast<double>(span[middle]) - static_cast<double>(fit.depth(middle)));
-    // A silhouette half a pixel inside its circle of n = 63 pixels lies by the square root of 1 / n of the radius before its plane: 1 in 8.
+    // Of the circle's radius of n = 63 pixels the silhouette's centres lie up to one inside: by r sqrt(2 / n) before the circle's plane.
     EXPECT_LE(found, expected * 1.02);
-    EXPECT_GE(found, expected * (1 - 1 / std::sqrt(63.) - .02));
+    EXPECT_GE(found, expected - 2 * 3 * std::sqrt(2 / 63.));
+}
+
+// From afar, where a body of revolution and the ball are one: the silhouette's line may be off by a pixel of 63, radii are tried in steps of
+// 6 %, and the front, where the footprint is taken, is 3 % nearer than the middle.
+TEST(Thickness, OfABallIsItsDiameter)
+{
+    const double pixel = .03 / 63;
+    const DepthMap map = image_of(241, 181, Ball{{.005, 0, 0}, pixel, 100, 3});
+    const DepthFit fit = fit_of(map, camera_for(241, 181, 241 * pixel / 2));
+    EXPECT_NEAR(thickness_of(fit)[fit.index(120, 90)], 6, 6 * (1 / 63. + .06 + .03));
 }
 
 } // namespace
