@@ -31,16 +31,19 @@ DepthMap averaged(int side)
 // A Gaussian blur of the disparity.
 DepthMap blurred(double deviation, const Noise& noise = {})
 {
-    return image_of(width, height, [deviation](double x, double y) {
-        double sum = 0, weights = 0;
-        for (int j = -6; j <= 6; ++j)
-            for (int i = -6; i <= 6; ++i) {
-                const double w = std::exp(-(i * i + j * j) / (2 * deviation * deviation));
-                sum += w * discs(x + i, y + j);
-                weights += w;
-            }
-        return sum / weights;
-    }, noise);
+    return image_of(
+        width, height,
+        [deviation](double x, double y) {
+            double sum = 0, weights = 0;
+            for (int j = -6; j <= 6; ++j)
+                for (int i = -6; i <= 6; ++i) {
+                    const double w = std::exp(-(i * i + j * j) / (2 * deviation * deviation));
+                    sum += w * discs(x + i, y + j);
+                    weights += w;
+                }
+            return sum / weights;
+        },
+        noise);
 }
 
 TEST(DepthEdges, CleanStepsAreClean)
@@ -98,7 +101,8 @@ TEST(DepthHoles, AreClosedAndNotShaded)
 {
     const Plane plane{.5, 1e-3, -7e-4};
     DepthMap map = image_of(61, 37, plane);
-    for (const auto& [x, y] : {std::pair{10, 10}, {11, 10}, {30, 20}, {0, 0}, {60, 36}, {40, 5}, {40, 6}, {40, 7}, {41, 6}}) map.at(x, y) = nothing_there;
+    for (const auto& [x, y] : {std::pair{10, 10}, {11, 10}, {30, 20}, {0, 0}, {60, 36}, {40, 5}, {40, 6}, {40, 7}, {41, 6}})
+        map.at(x, y) = nothing_there;
     const DepthFit fit = fit_of(map);
     EXPECT_EQ(fit.quality.filled, 9u);
     for (int y = 0; y < 37; ++y)
@@ -139,7 +143,8 @@ TEST(DepthHoles, ClosingByItsDefinition)
         const auto given = [&](int x, int y) { return there[static_cast<std::size_t>(y * 29 + x)] != 0; };
         const auto grown = [&](int x, int y) { return near(given, x, y, true); };
         for (int y = 0; y < 17; ++y)
-            for (int x = 0; x < 29; ++x) EXPECT_EQ(closed[static_cast<std::size_t>(y * 29 + x)] != 0, !given(x, y) && near(grown, x, y, false));
+            for (int x = 0; x < 29; ++x)
+                EXPECT_EQ(closed[static_cast<std::size_t>(y * 29 + x)] != 0, !given(x, y) && near(grown, x, y, false));
     }
 }
 

@@ -56,8 +56,8 @@ std::vector<Disparity> scenes(int width)
     return {tilted, Crease{tilted, beside}, Step{tilted, behind, 3.2}, Ball{behind, 1.2 / width, 3, .6}};
 }
 
-// Clean images have distances from their planes of a few roundings, and limits far above them; at creases and round bodies distances take all
-// values, so some of the pixels near lines of equal choice are unsure: a band of a few pixels along them.
+// Clean images have distances from their planes of a few roundings, and limits far above them; at creases and round bodies distances take
+// all values, so some of the pixels near lines of equal choice are unsure: a band of a few pixels along them.
 TEST(DepthFitOracle, CleanImages)
 {
     for (const auto& [width, height] : {std::pair{61, 37}, std::pair{93, 7}})

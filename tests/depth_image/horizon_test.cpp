@@ -17,7 +17,8 @@ DepthSurface surface_of_random(int count, const Camera& camera)
     for (int i = 0; i < count; ++i) {
         Vec3 normal(unit(random), unit(random), unit(random));
         normal.normalize();
-        surface.points.push_back({static_cast<float>(unit(random)), static_cast<float>(unit(random)), static_cast<float>(3 + unit(random))});
+        surface.points.push_back(
+            {static_cast<float>(unit(random)), static_cast<float>(unit(random)), static_cast<float>(3 + unit(random))});
         surface.normals.push_back({static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)});
     }
     return surface;
@@ -49,7 +50,8 @@ double counted_share(const Vec3& to_centre, const Vec3& half_u, const Vec3& half
     return static_cast<double>(above) / all;
 }
 
-// An edge runs through at most 2 side cells of side^2, each counted wholly: less than 2 / side wrong; a disc's border as much again, over pi / 4.
+// An edge runs through at most 2 side cells of side^2, each counted wholly: less than 2 / side wrong; a disc's border as much again, over
+// pi / 4.
 constexpr double square_margin = 2. / side, disc_margin = 2 * 2. / side * 4 / std::numbers::pi;
 
 template <class Share> void expect_shares(const Light& light, const Camera& camera, double margin, const Share& share)
@@ -58,7 +60,8 @@ template <class Share> void expect_shares(const Light& light, const Camera& came
     const auto found = clipped(light, surface, std::vector<float>(300, 1.f), 1);
     int between = 0;
     for (std::size_t i = 0; i < 300; ++i) {
-        const Vec3 point(surface.points[i].x, surface.points[i].y, surface.points[i].z), normal(surface.normals[i].x, surface.normals[i].y, surface.normals[i].z);
+        const Vec3 point(surface.points[i].x, surface.points[i].y, surface.points[i].z),
+            normal(surface.normals[i].x, surface.normals[i].y, surface.normals[i].z);
         EXPECT_NEAR(found[i], share(point, normal), margin) << i;
         between += found[i] > 0 && found[i] < 1;
     }
@@ -68,7 +71,8 @@ template <class Share> void expect_shares(const Light& light, const Camera& came
 Camera turned_camera()
 {
     const double c = std::cos(.6), s = std::sin(.6);
-    return {.frame = {.origin = {3, -1, 2}, .x = {c, 0, -s}, .y = {0, 1, 0}, .z = {s, 0, c}}, .orthographic = false, .half_extent = {.6, .4}};
+    return {
+        .frame = {.origin = {3, -1, 2}, .x = {c, 0, -s}, .y = {0, 1, 0}, .z = {s, 0, c}}, .orthographic = false, .half_extent = {.6, .4}};
 }
 
 // From the world to the camera's x right, y up, z along the view.
@@ -116,9 +120,11 @@ TEST(DepthHorizon, OfAPoint)
     const Camera camera = turned_camera();
     const DepthSurface surface = surface_of_random(300, camera);
     const Vec3 centre(2, 2, -1);
-    const auto found = clipped(PointLight{.center = centre, .direction = {0, -1, 0}, .up = Vec3(0, 0, 1)}, surface, std::vector<float>(300, .75f), 1);
+    const auto found =
+        clipped(PointLight{.center = centre, .direction = {0, -1, 0}, .up = Vec3(0, 0, 1)}, surface, std::vector<float>(300, .75f), 1);
     for (std::size_t i = 0; i < 300; ++i) {
-        const Vec3 point(surface.points[i].x, surface.points[i].y, surface.points[i].z), normal(surface.normals[i].x, surface.normals[i].y, surface.normals[i].z);
+        const Vec3 point(surface.points[i].x, surface.points[i].y, surface.points[i].z),
+            normal(surface.normals[i].x, surface.normals[i].y, surface.normals[i].z);
         const double height = normal.dot(seen(camera, centre - camera.frame.origin) - point);
         // Some roundings of lengths below 10.
         if (std::abs(height) > 1e-5) {

@@ -21,13 +21,15 @@ Scene lit_plane(const Plane& plane, double distance, double half, const Noise& n
                                  .half_u = v * (.3 * distance), // shines along half_v x half_u = -normal
                                  .half_v = u * (-.2 * distance),
                                  .emission = {}};
-    scene.objects.push_back({.name = "seen", .mesh = {}, .casts = true, .receives = true, .seen = SeenSurface{.depth = map, .camera = camera}});
-    scene.receivers = {.camera = PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent}, .width = width, .height = height, .depth = map};
+    scene.objects.push_back(
+        {.name = "seen", .mesh = {}, .casts = true, .receives = true, .seen = SeenSurface{.depth = map, .camera = camera}});
+    scene.receivers = {
+        .camera = PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent}, .width = width, .height = height, .depth = map};
     return scene;
 }
 
-// Steps of disparity a pixel, of that in the middle. Under a narrow field of view they graze: at the steepest by 2.4 degrees, and disparity falls to
-// a seventh across the image.
+// Steps of disparity a pixel, of that in the middle. Under a narrow field of view they graze: at the steepest by 2.4 degrees, and disparity
+// falls to a seventh across the image.
 const std::vector<Plane> planes = {{1, 0, 0}, {1, 4e-3, 0}, {1, 0, -.01}, {1, -.01, .015}, {1, .02, .01}, {1, 0, .04}};
 
 void expect_lit(const Engine& engine, const Scene& scene, const Technique& technique)
@@ -46,8 +48,8 @@ void expect_lit_planes(const Technique& technique)
         for (const double distance : {1e-6, 1., 1e6})
             for (const double half : {.6, .05})
                 for (const double noise : {0., 1e-6, 1e-3}) {
-                    SCOPED_TRACE(testing::Message() << "slopes " << plane.slope_x << ", " << plane.slope_y << ", distance " << distance << ", half "
-                                                    << half << ", noise " << noise);
+                    SCOPED_TRACE(testing::Message() << "slopes " << plane.slope_x << ", " << plane.slope_y << ", distance " << distance
+                                                    << ", half " << half << ", noise " << noise);
                     expect_lit(engine, lit_plane(plane, distance, half, {noise}), technique);
                 }
 }
@@ -63,7 +65,8 @@ TEST(DepthSurface, ASquareBeforeThePlaneShadowsIt)
         scene.objects[0].seen->depth = *scene.receivers.depth;
         for (const Technique& technique : {Technique{DepthTrace{}}, Technique{RayTraced{.samples = 64}}}) {
             const Mask mask = engine.mask(scene, technique);
-            EXPECT_GT(std::count_if(mask.visibility.pixels.begin(), mask.visibility.pixels.end(), [](float v) { return v < .5f; }), 5) << distance;
+            EXPECT_GT(std::count_if(mask.visibility.pixels.begin(), mask.visibility.pixels.end(), [](float v) { return v < .5f; }), 5)
+                << distance;
         }
     }
 }

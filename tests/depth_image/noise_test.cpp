@@ -6,8 +6,8 @@ namespace {
 
 const Plane tilted{.5, 1e-4, -7e-5};
 
-// A median of n normal sizes is off by 1.17 / sqrt(n) of itself, and neighbouring second differences are not independent: of 95,000 below 1 %
-// all together. 10 % leave room for the 3e-8 that float32's own rounding adds.
+// A median of n normal sizes is off by 1.17 / sqrt(n) of itself, and neighbouring second differences are not independent: of 95,000 below 1
+// % all together. 10 % leave room for the 3e-8 that float32's own rounding adds.
 TEST(DepthNoise, IsFound)
 {
     for (const double noise : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2})

@@ -20,8 +20,9 @@ DepthFit expect_sane(const DepthMap& map, bool orthographic)
             EXPECT_EQ(surface.points[i].z, 0);
             continue;
         }
-        for (const float number : {fit.value[i], fit.slope_x[i], fit.slope_y[i], fit.residual[i], fit.count[i], fit.sigma[i], image.pixels[i].back,
-                                   image.pixels[i].slack, image.pixels[i].joint, surface.points[i].z, surface.normals[i].z})
+        for (const float number :
+             {fit.value[i], fit.slope_x[i], fit.slope_y[i], fit.residual[i], fit.count[i], fit.sigma[i], image.pixels[i].back,
+              image.pixels[i].slack, image.pixels[i].joint, surface.points[i].z, surface.normals[i].z})
             EXPECT_TRUE(std::isfinite(number)) << i;
         EXPECT_GT(fit.value[i], 0);
         EXPECT_GT(image.pixels[i].back, 0);
@@ -81,8 +82,8 @@ TEST(DepthOfNothing, ThinImages)
             const auto depth = [&](int x, int y) { return orthographic ? 2 + .01 * (x + y) : 1 / (.5 - .002 * (x + y)); };
             const DepthMap map = map_of(width, height, [&](int x, int y) { return static_cast<float>(depth(x, y)); });
             const DepthFit fit = expect_sane(map, orthographic);
-            // A line of pixels has no plane, and what was measured stays; 3 x 3 pixels have one. 9 roundings of a value (plane_test.cpp), of up to
-            // 4.8 = 2 x the furthest, and two of the depth.
+            // A line of pixels has no plane, and what was measured stays; 3 x 3 pixels have one. 9 roundings of a value (plane_test.cpp),
+            // of up to 4.8 = 2 x the furthest, and two of the depth.
             for (int y = 0; y < height; ++y)
                 for (int x = 0; x < width; ++x) EXPECT_NEAR(fit.depth(fit.index(x, y)), depth(x, y), 11 * rounding * 4.8) << x << ", " << y;
         }

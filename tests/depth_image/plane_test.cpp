@@ -4,8 +4,8 @@
 namespace penumbra::test {
 namespace {
 
-// A measured value has two roundings of float32, of depth and of disparity. The plane is a weighted mean of such values, and at the border an
-// extrapolation by half a window at the most, whose weights' sizes sum to less than 4; one rounding more stores it.
+// A measured value has two roundings of float32, of depth and of disparity. The plane is a weighted mean of such values, and at the border
+// an extrapolation by half a window at the most, whose weights' sizes sum to less than 4; one rounding more stores it.
 constexpr double plane_ulps = 2 * 4 + 1;
 
 void expect_plane(const DepthMap& map, const Camera& camera, const Plane& plane, double far = 0)

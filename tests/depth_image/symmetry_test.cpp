@@ -15,10 +15,12 @@ struct Change {
     std::size_t source(int x, int y) const
     {
         const int px = 2 * x + 1 - size, py = 2 * y + 1 - size;
-        return static_cast<std::size_t>((yx * px + yy * py + size - 1) / 2) * size + static_cast<std::size_t>((xx * px + xy * py + size - 1) / 2);
+        return static_cast<std::size_t>((yx * px + yy * py + size - 1) / 2) * size +
+               static_cast<std::size_t>((xx * px + xy * py + size - 1) / 2);
     }
 };
-const std::vector<Change> changes = {{"left and right", -1, 0, 0, 1}, {"top and bottom", 1, 0, 0, -1}, {"a quarter turn", 0, 1, -1, 0}, {"half a turn", -1, 0, 0, -1}};
+const std::vector<Change> changes = {
+    {"left and right", -1, 0, 0, 1}, {"top and bottom", 1, 0, 0, -1}, {"a quarter turn", 0, 1, -1, 0}, {"half a turn", -1, 0, 0, -1}};
 
 DepthMap changed(const DepthMap& map, const Change& change)
 {
@@ -50,7 +52,8 @@ void expect_same_fit(const DepthFit& before, const DepthFit& after, const Change
             // The step along x of the changed image is that along (xx, yx) of the old one.
             const float sx = static_cast<float>(change.xx) * before.slope_x[j] + static_cast<float>(change.yx) * before.slope_y[j];
             const float sy = static_cast<float>(change.xy) * before.slope_x[j] + static_cast<float>(change.yy) * before.slope_y[j];
-            differing += std::abs(after.value[i] - before.value[j]) > 2e-6f || std::abs(after.slope_x[i] - sx) > 2e-6f || std::abs(after.slope_y[i] - sy) > 2e-6f;
+            differing += std::abs(after.value[i] - before.value[j]) > 2e-6f || std::abs(after.slope_x[i] - sx) > 2e-6f ||
+                         std::abs(after.slope_y[i] - sy) > 2e-6f;
         }
     EXPECT_LE(differing, size * size / 50);
 }
@@ -82,7 +85,8 @@ TEST(DepthSymmetry, OfThickness)
         for (int y = 0; y < size; ++y)
             for (int x = 0; x < size; ++x) {
                 const std::size_t i = after.index(x, y), j = change.source(x, y);
-                after.value[i] = before.value[j], after.there[i] = before.there[j], after.mixed[i] = before.mixed[j], after.sigma[i] = before.sigma[j];
+                after.value[i] = before.value[j], after.there[i] = before.there[j], after.mixed[i] = before.mixed[j],
+                after.sigma[i] = before.sigma[j];
                 after.slope_x[i] = static_cast<float>(change.xx) * before.slope_x[j] + static_cast<float>(change.yx) * before.slope_y[j];
                 after.slope_y[i] = static_cast<float>(change.xy) * before.slope_x[j] + static_cast<float>(change.yy) * before.slope_y[j];
             }
@@ -90,7 +94,8 @@ TEST(DepthSymmetry, OfThickness)
         // The membrane is solved to 1e-4 of the thickness it gives, from unknowns in another order.
         const float largest = *std::max_element(thick.begin(), thick.end());
         for (int y = 0; y < size; ++y)
-            for (int x = 0; x < size; ++x) EXPECT_NEAR(found[after.index(x, y)], thick[change.source(x, y)], 2 * 2e-4 * largest) << x << ", " << y;
+            for (int x = 0; x < size; ++x)
+                EXPECT_NEAR(found[after.index(x, y)], thick[change.source(x, y)], 2 * 2e-4 * largest) << x << ", " << y;
     }
 }
 

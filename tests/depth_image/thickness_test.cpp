@@ -9,7 +9,10 @@ namespace {
 
 using Marks = std::vector<std::uint8_t>;
 
-std::size_t index_of(int width, int x, int y) { return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x); }
+std::size_t index_of(int width, int x, int y)
+{
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
 
 void expect_distances(const Marks& marked, int width, int height)
 {
@@ -49,9 +52,9 @@ std::vector<float> distance_in(const Shape& shape, int size)
     return distance_to(outside, size, size);
 }
 
-// Radii are tried in steps of 6 % and half a pixel at least, so the widest that is found may be smaller by a step, and a pixel's own distance
-// is exact. The shape itself is right to a pixel on either side: distances count to the centres of pixels outside, up to sqrt(2) beyond the
-// border. Pixels of the border itself may stick out of every disc of pixels.
+// Radii are tried in steps of 6 % and half a pixel at least, so the widest that is found may be smaller by a step, and a pixel's own
+// distance is exact. The shape itself is right to a pixel on either side: distances count to the centres of pixels outside, up to sqrt(2)
+// beyond the border. Pixels of the border itself may stick out of every disc of pixels.
 void expect_thickness(const Shape& shape, int size, double expected, const Shape& looked_at)
 {
     const auto distance = distance_in(shape, size), found = local_thickness(distance, size, size);
@@ -93,20 +96,22 @@ TEST(LocalThickness, OfARingIsHalfItsWidth)
     expect_thickness([](double x, double y) { return std::abs(std::hypot(x, y) - 32) < 8; }, 101, 8);
 }
 
-// --- Membranes ------------------------------------------------------------------------------------------------------------------------------
+// --- Membranes
+// ------------------------------------------------------------------------------------------------------------------------------
 
 // A plate, tilted, before a wall: its membrane is the plate.
 TEST(Membrane, OfAPlaneIsThePlane)
 {
     const Plane plate{.5, 1e-3, -6e-4}, wall{.2, 1e-4, 0};
-    const DepthFit fit = fit_of(image_of(121, 91, [&](double x, double y) { return std::abs(x) < 40 && std::abs(y) < 30 ? plate(x, y) : wall(x, y); }));
+    const DepthFit fit =
+        fit_of(image_of(121, 91, [&](double x, double y) { return std::abs(x) < 40 && std::abs(y) < 30 ? plate(x, y) : wall(x, y); }));
     const auto span = membrane(fit, silhouettes(fit));
     for (int y = 0; y < 91; ++y)
         for (int x = 0; x < 121; ++x) {
             const double px = x + .5 - 60.5, py = y + .5 - 45.5;
             if (std::abs(px) >= 40 || std::abs(py) >= 30) continue;
-            // What is left of the right hand side are roundings of the values, up to 9 (plane_test.cpp) at each of four neighbours; a membrane
-            // sums them up with Green's function, whose sum of squares over a plate of n pixels' half width is about n^2 / 10.
+            // What is left of the right hand side are roundings of the values, up to 9 (plane_test.cpp) at each of four neighbours; a
+            // membrane sums them up with Green's function, whose sum of squares over a plate of n pixels' half width is about n^2 / 10.
             EXPECT_NEAR(span[fit.index(x, y)], fit.value[fit.index(x, y)], 36 * rounding * .6 * 30 / std::sqrt(10.));
         }
 }
@@ -155,8 +160,8 @@ TEST(Membrane, SolvesLaplacesEquation)
     EXPECT_GT(right, 0);
 }
 
-// A ball closes as it opened: twice the way to the silhouette's plane is the ball's own thickness, but for the part of it that the camera sees
-// short of the equator and for the pixel that the silhouette lies inside.
+// A ball closes as it opened: twice the way to the silhouette's plane is the ball's own thickness, but for the part of it that the camera
+// sees short of the equator and for the pixel that the silhouette lies inside.
 TEST(Membrane, OfABallMirrorsIt)
 {
     const Ball ball{{.1, 0, 0}, 1.2 / 241, 10, 3};
@@ -171,8 +176,8 @@ TEST(Membrane, OfABallMirrorsIt)
     EXPECT_GE(found, expected - 2 * 3 * std::sqrt(2 / 63.));
 }
 
-// From afar, where a body of revolution and the ball are one: the silhouette's line may be off by a pixel of 63, radii are tried in steps of
-// 6 %, and the front, where the footprint is taken, is 3 % nearer than the middle.
+// From afar, where a body of revolution and the ball are one: the silhouette's line may be off by a pixel of 63, radii are tried in steps
+// of 6 %, and the front, where the footprint is taken, is 3 % nearer than the middle.
 TEST(Thickness, OfABallIsItsDiameter)
 {
     const double pixel = .03 / 63;

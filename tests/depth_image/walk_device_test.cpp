@@ -47,12 +47,13 @@ Bits on_device(const DepthImage& image, const std::vector<DepthVector>& points, 
     const auto corners = corners_of(strata);
     const auto on_strata = work.upload(std::span<const cl_float2>(corners), "strata");
     const std::vector<cl_uint> none(words * points.size());
-    const auto blocked = work.upload(std::span<const cl_uint>(none), "blocked"), crossed = work.upload(std::span<const cl_uint>(none), "crossed"),
+    const auto blocked = work.upload(std::span<const cl_uint>(none), "blocked"),
+               crossed = work.upload(std::span<const cl_uint>(none), "crossed"),
                unknown = work.upload(std::span<const cl_uint>(none), "unknown"),
                left = work.upload(std::span<const cl_uint>(none).first(points.size()), "left");
     const cl_float2 step{{static_cast<float>(strata.step_x * 0x1p-16), static_cast<float>(strata.step_y * 0x1p-16)}};
-    work.launch(depth_trace_program(), "depth_trace", {points.size(), 1}, {64, 1}, 0, image.view, light_of(static_cast<int>(points.size())), cl_int{1},
-                pixels, nearest, on_points, cl::Buffer(), on_strata, step, blocked, crossed, unknown, left);
+    work.launch(depth_trace_program(), "depth_trace", {points.size(), 1}, {64, 1}, 0, image.view, light_of(static_cast<int>(points.size())),
+                cl_int{1}, pixels, nearest, on_points, cl::Buffer(), on_strata, step, blocked, crossed, unknown, left);
     Bits bits{work.read(blocked), work.read(crossed), work.read(unknown)};
     work.finish();
     return bits;
@@ -60,14 +61,17 @@ Bits on_device(const DepthImage& image, const std::vector<DepthVector>& points, 
 
 Bits on_host(const DepthImage& image, const std::vector<DepthVector>& points, const Strata& strata)
 {
-    Bits bits{std::vector<cl_uint>(words * points.size()), std::vector<cl_uint>(words * points.size()), std::vector<cl_uint>(words * points.size())};
+    Bits bits{std::vector<cl_uint>(words * points.size()), std::vector<cl_uint>(words * points.size()),
+              std::vector<cl_uint>(words * points.size())};
     const DepthLight light = light_of(static_cast<int>(points.size()));
     for (std::size_t i = 0; i < points.size(); ++i)
         for (int first = 0; first < samples; first += packet) {
             float x[packet], y[packet];
             jittered(strata, first, sample_key(seed, i, 0), x, y);
             for (int k = 0; k < packet; ++k) {
-                const auto along = [&](int axis, float from) { return light.centre[axis] - from + x[k] * light.half_u[axis] + y[k] * light.half_v[axis]; };
+                const auto along = [&](int axis, float from) {
+                    return light.centre[axis] - from + x[k] * light.half_u[axis] + y[k] * light.half_v[axis];
+                };
                 const DepthVector way{along(0, points[i].x), along(1, points[i].y), along(2, points[i].z)};
                 const DepthMet met = walk(image, DEPTH_LEVELS, depth_line(image.view, points[i], way, 0, DEPTH_OWN_PIXELS), 1, 0);
                 const std::size_t word = static_cast<std::size_t>((first + k) / 32) * points.size() + i;

@@ -58,7 +58,9 @@ inline DepthVector vector_of(double x, double y, double z) { return {static_cast
 inline DepthLine random_line(WalkRandom& random, const DepthView& view)
 {
     const auto point = [&] {
-        const double z = random.below(6) == 0 ? random.between(-2, .5) : view.orthographic ? random.between(0, 1.5) : 1 / random.between(.05, 1.5);
+        const double z = random.below(6) == 0 ? random.between(-2, .5)
+                         : view.orthographic  ? random.between(0, 1.5)
+                                              : 1 / random.between(.05, 1.5);
         const double reach = view.orthographic ? 1 : std::abs(z);
         return Vec3(random.between(-1, 1) * reach, random.between(-1, 1) * reach, z);
     };

@@ -39,7 +39,8 @@ template <class MakeLine> int differing(const Case& c, int lines, const MakeLine
 template <class MakeLine> void expect_same(const MakeLine& make)
 {
     for (const Case& c : cases) {
-        SCOPED_TRACE(testing::Message() << c.width << " x " << c.height << (c.orthographic ? ", orthographic" : "") << ", steep " << c.steep);
+        SCOPED_TRACE(testing::Message() << c.width << " x " << c.height << (c.orthographic ? ", orthographic" : "") << ", steep "
+                                        << c.steep);
         EXPECT_EQ(differing(c, 20000, make, 0, 0), 0) << "blocked";
         EXPECT_EQ(differing(c, 20000, make, 1, 0), 0) << "all that is met";
         EXPECT_EQ(differing(c, 20000, make, 0, 1), 0) << "through";
@@ -124,7 +125,8 @@ TEST(DepthWalk, LinesAreStraightInTheImage)
         const DepthView& view = image.view;
         WalkRandom random(3);
         for (int i = 0; i < 2000; ++i) {
-            const Vec3 from(random.between(-.5, .5), random.between(-.4, .4), random.between(.6, 3)), to(random.between(-.5, .5), random.between(-.4, .4), random.between(.6, 3));
+            const Vec3 from(random.between(-.5, .5), random.between(-.4, .4), random.between(.6, 3)),
+                to(random.between(-.5, .5), random.between(-.4, .4), random.between(.6, 3));
             const Vec3 way = to - from;
             const DepthLine line = depth_line(view, vector_of(from.x, from.y, from.z), vector_of(way.x, way.y, way.z), 0, 0);
             if (!(line.from < line.to)) continue;

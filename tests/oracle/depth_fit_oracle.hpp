@@ -29,7 +29,10 @@ struct PixelPlane {
 
 constexpr double u = 0x1p-24;
 
-inline double loose(double value, double sigma, double sx, double sy) { return 4 * sigma + .8 * (std::abs(sx) + std::abs(sy)) + 3e-7 * value; }
+inline double loose(double value, double sigma, double sx, double sy)
+{
+    return 4 * sigma + .8 * (std::abs(sx) + std::abs(sy)) + 3e-7 * value;
+}
 
 inline double smaller_step(double before, double here, double after)
 {
@@ -41,7 +44,7 @@ inline double smaller_step(double before, double here, double after)
 // The sums of one pass; `s` sums of sizes, for the bound.
 struct Sums {
     double w = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, v = 0, vx = 0, vy = 0, vv = 0;
-    double s = 0, sx = 0, sy = 0;       // weight times the distance's size, and times i and j
+    double s = 0, sx = 0, sy = 0; // weight times the distance's size, and times i and j
     double x_size = 0, y_size = 0;
     int terms = 0;
     void add(double weight, double i, double j, double off)
@@ -59,7 +62,8 @@ inline Sums gather(const Image& image, PixelPlane& p, int px, int py, int reach,
 {
     Sums sums;
     // A distance is wrong by the plane's error at that pixel, by two roundings of the slopes' product and one of the difference.
-    const double doubt = p.value_error + 2 * reach * p.slope_error + 4 * u * reach * (std::abs(p.slope_x) + std::abs(p.slope_y)) + 4 * u * limit;
+    const double doubt =
+        p.value_error + 2 * reach * p.slope_error + 4 * u * reach * (std::abs(p.slope_x) + std::abs(p.slope_y)) + 4 * u * limit;
     for (int j = -reach; j <= reach; ++j)
         for (int i = -reach; i <= reach; ++i) {
             const double other = image.at(px + i, py + j);
@@ -71,20 +75,22 @@ inline Sums gather(const Image& image, PixelPlane& p, int px, int py, int reach,
     return sums;
 }
 
-// What Cramer's rule makes of float32's sums, at most: each sum of n terms is off by (n + 4) u of the sum of its terms' sizes, and so is each
-// product of them; a quotient by what the determinant is off. Each distance is off by `each_off` besides: three roundings of the slopes' products.
+// What Cramer's rule makes of float32's sums, at most: each sum of n terms is off by (n + 4) u of the sum of its terms' sizes, and so is
+// each product of them; a quotient by what the determinant is off. Each distance is off by `each_off` besides: three roundings of the
+// slopes' products.
 inline void bound(const Sums& q, double determinant, double da, double dx, double dy, double each_off, PixelPlane& p)
 {
     const double x = std::abs(q.x) + u, y = std::abs(q.y) + u, xy = std::abs(q.xy) + u;
-    const double c00 = q.xx * q.yy + xy * xy, c01 = xy * y + x * q.yy, c02 = x * xy + q.xx * y, c11 = q.w * q.yy + y * y, c12 = x * y + q.w * xy,
-                 c22 = q.w * q.xx + x * x;
+    const double c00 = q.xx * q.yy + xy * xy, c01 = xy * y + x * q.yy, c02 = x * xy + q.xx * y, c11 = q.w * q.yy + y * y,
+                 c12 = x * y + q.w * xy, c22 = q.w * q.xx + x * x;
     const double each = (3 * q.terms + 12) * u, whole = (q.w * c00 + x * c01 + y * c02) / determinant;
     const double a = (q.s * c00 + q.sx * c01 + q.sy * c02) / determinant + std::abs(da) * whole;
     const double b = (q.s * c01 + q.sx * c11 + q.sy * c12) / determinant + std::abs(dx) * whole;
     const double c = (q.s * c02 + q.sx * c12 + q.sy * c22) / determinant + std::abs(dy) * whole;
     p.value_error = u * p.value + each * a + each_off * (q.w * c00 + q.x_size * c01 + q.y_size * c02) / determinant;
-    p.slope_error = u * (std::abs(p.slope_x) + std::abs(p.slope_y)) + each * std::max(b, c) +
-                    each_off * std::max(q.w * c01 + q.x_size * c11 + q.y_size * c12, q.w * c02 + q.x_size * c12 + q.y_size * c22) / determinant;
+    p.slope_error =
+        u * (std::abs(p.slope_x) + std::abs(p.slope_y)) + each * std::max(b, c) +
+        each_off * std::max(q.w * c01 + q.x_size * c11 + q.y_size * c12, q.w * c02 + q.x_size * c12 + q.y_size * c22) / determinant;
     p.square_error = each * (q.vv + std::abs(da) * q.s + std::abs(dx) * q.sx + std::abs(dy) * q.sy) / q.w +
                      each * (a * q.s + b * q.sx + c * q.sy) / q.w + 2 * each_off * q.s / q.w + each_off * each_off;
 }
@@ -138,7 +144,9 @@ inline double score_error(const PixelPlane& p, int reach)
 // The plane that a pixel has after creases were looked at.
 inline PixelPlane beside_crease(const Image& image, const std::vector<PixelPlane>& planes, int x, int y, int reach)
 {
-    const auto index = [&](int i, int j) { return static_cast<std::size_t>(j) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(i); };
+    const auto index = [&](int i, int j) {
+        return static_cast<std::size_t>(j) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(i);
+    };
     const double own = image.value[index(x, y)], sigma = image.sigma[index(x, y)];
     PixelPlane result = planes[index(x, y)];
     const double edge = 2 * sigma + 1e-7 * own;
@@ -150,18 +158,21 @@ inline PixelPlane beside_crease(const Image& image, const std::vector<PixelPlane
         for (int i = -reach; i <= reach; i += reach) {
             if ((i == 0 && j == 0) || !(image.at(x + i, y + j) > 0)) continue;
             const PixelPlane& from = planes[index(x + i, y + j)];
-            const double here = from.value - from.slope_x * i - from.slope_y * j, mark = score(from, own, here), error = score_error(from, reach);
+            const double here = from.value - from.slope_x * i - from.slope_y * j, mark = score(from, own, here),
+                         error = score_error(from, reach);
             const double limit = 3 * sigma + .5 * (std::abs(from.slope_x) + std::abs(from.slope_y)) + 3e-7 * own;
             const bool near = std::abs(here - own) < limit;
             if (near || std::abs(std::abs(here - own) - limit) < error) result.sure &= std::abs(mark - .2 * best) > error + .2 * best_error;
-            if (mark < .2 * best || std::abs(mark - .2 * best) < error + .2 * best_error) result.sure &= std::abs(std::abs(here - own) - limit) > error;
+            if (mark < .2 * best || std::abs(mark - .2 * best) < error + .2 * best_error)
+                result.sure &= std::abs(std::abs(here - own) - limit) > error;
             if (!near || !(mark < .2 * best)) continue;
             best = mark, best_error = error;
             const bool sure = result.sure && from.sure;
             result = from;
             result.value = here;
             // Two products and two differences more.
-            result.value_error += reach * 2 * from.slope_error + 2 * u * (std::abs(here) + reach * (std::abs(from.slope_x) + std::abs(from.slope_y)));
+            result.value_error +=
+                reach * 2 * from.slope_error + 2 * u * (std::abs(here) + reach * (std::abs(from.slope_x) + std::abs(from.slope_y)));
             result.sure = sure;
         }
     return result;
