@@ -229,7 +229,7 @@ inline void block_lines(Lines* lines, const int groups, const DepthPixel pixel, 
         const floatn rise = pixel.slope_x * lines[g].step_x + pixel.slope_y * lines[g].step_y - lines[g].step_value;
         const floatn a = base + begin * rise, b = base + end * rise;
         const floatn high = select_lanes(b, a, a > b), low = select_lanes(a, b, a > b);
-        lines[g].blocked |= (begin <= end) & (high > pixel.slack) & (low < deep) & (begin * lines[g].speed >= clear);
+        lines[g].blocked |= (begin < end) & (high > pixel.slack) & (low < deep) & (begin * lines[g].speed >= clear);
     }
 }
 

@@ -16,8 +16,8 @@ struct DepthEncoding {
     std::optional<double> near, far;
     double scale = 1; // multiplies the decoded depth
     std::optional<double> empty;
-    std::optional<double> shift; // disparity alone: 1 / depth = value scale + shift; without it, depth = scale / value
-    std::optional<double> precision; // standard error of a depth over the depth; without it, estimated from the image
+    std::optional<double> shift = {}; // disparity alone: 1 / depth = value scale + shift; without it, depth = scale / value
+    std::optional<double> precision = {}; // standard error of a depth over the depth; without it, estimated from the image
 };
 
 // The stored samples of one channel as float32. Integers come as stored (0 to 255, 0 to 65535), not divided.

@@ -58,6 +58,7 @@ typedef struct {
     float step_x, step_y, step_value;
     float from, to;
     float own; // hits before this many pixels do not count
+    int leaves; // some of it, below everything that the image shows, lies beside the image
     float unit; // t of an unscaled step: see depth_along
     float start_z;
 } DepthLine;
@@ -108,6 +109,7 @@ DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, Dep
 {
     DepthLine line;
     line.own = own;
+    line.leaves = 0;
     line.from = 0.0f;
     line.to = -1.0f;
     line.x = line.y = line.value = line.step_x = line.step_y = line.step_value = line.unit = line.start_z = 0.0f;
@@ -164,6 +166,7 @@ DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, Dep
     if (line.step_value > 0.0f) line.to = fmin(line.to, (view.nearest - line.value) / line.step_value);
     if (line.step_value < 0.0f) line.from = fmax(line.from, (view.nearest - line.value) / line.step_value);
     if (line.step_value == 0.0f && line.value > view.nearest) line.to = -1.0f;
+    const float begin = line.from, end = line.to;
     if (line.step_x != 0.0f) {
         const float a = -line.x / line.step_x, b = ((float)view.width - line.x) / line.step_x;
         line.from = fmax(line.from, fmin(a, b));
@@ -178,6 +181,7 @@ DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, Dep
     } else if (line.y < 0.0f || line.y >= (float)view.height) {
         line.to = -1.0f;
     }
+    line.leaves = begin < end && (line.from > begin || line.to < end);
     return line;
 }
 
@@ -203,7 +207,8 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
                                    const DepthLine line, const int all, const int through)
 {
     DepthMet met;
-    met.blocked = met.crossed = met.behind = met.left = 0;
+    met.blocked = met.crossed = met.behind = 0;
+    met.left = line.leaves;
     met.enter = met.leave = 0.0f;
     if (!(line.from < line.to)) return met;
     const float inverse_x = line.step_x != 0.0f ? 1.0f / line.step_x : 0.0f, inverse_y = line.step_y != 0.0f ? 1.0f / line.step_y : 0.0f;
@@ -213,8 +218,7 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
     cx = cx < 0 ? 0 : cx >= view.width ? view.width - 1 : cx;
     cy = cy < 0 ? 0 : cy >= view.height ? view.height - 1 : cy;
 
-    int solid = 0;                                     // inside the first solid
-    int joined = 1, was_behind = 0, last = cy * view.width + cx;
+    int solid = 0; // inside the first solid
     while (t < line.to && cx >= 0 && cy >= 0 && cx < view.width && cy < view.height) {
         // The coarsest block that the line passes above.
         int skipped = 0;
@@ -224,33 +228,30 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
             const float end = fmin(line.to, fmin(ex, ey));
             const float lowest = fmin(line.value + t * line.step_value, line.value + end * line.step_value);
             if (!(lowest > nearest[view.level_offset[level] + by * view.level_width[level] + bx])) continue;
-            skipped = joined = 1;
-            was_behind = 0;
+            skipped = 1;
             t = end;
             if (ex < ey) {
                 const int y = (int)floor(line.y + t * line.step_y), low = by * side, high = by * side + side - 1;
                 cx = line.step_x > 0.0f ? (bx + 1) * side : bx * side - 1;
                 cy = y < low ? low : y > high ? high : y;
+                cy = cy >= view.height ? view.height - 1 : cy;
             } else {
                 const int x = (int)floor(line.x + t * line.step_x), low = bx * side, high = bx * side + side - 1;
                 cy = line.step_y > 0.0f ? (by + 1) * side : by * side - 1;
                 cx = x < low ? low : x > high ? high : x;
+                cx = cx >= view.width ? view.width - 1 : cx;
             }
-            // The pixel that the line comes from, for `joined`.
-            int from_x = ex < ey ? cx - (line.step_x > 0.0f ? 1 : -1) : cx, from_y = ex < ey ? cy : cy - (line.step_y > 0.0f ? 1 : -1);
-            from_x = from_x < 0 ? 0 : from_x >= view.width ? view.width - 1 : from_x;
-            from_y = from_y < 0 ? 0 : from_y >= view.height ? view.height - 1 : from_y;
-            last = from_y * view.width + from_x;
         }
         if (skipped) continue;
 
         // One pixel, between its own borders.
         const float ex = depth_border(cx, 1, line.x, line.step_x, inverse_x, 1), ey = depth_border(cy, 1, line.y, line.step_y, inverse_y, 1);
-        const float begin = fmax(line.from, fmax(depth_border(cx, 1, line.x, line.step_x, inverse_x, 0), depth_border(cy, 1, line.y, line.step_y, inverse_y, 0)));
+        const float enter_x = depth_border(cx, 1, line.x, line.step_x, inverse_x, 0), enter_y = depth_border(cy, 1, line.y, line.step_y, inverse_y, 0);
+        const float begin = fmax(line.from, fmax(enter_x, enter_y));
         const float end = fmin(line.to, fmin(ex, ey));
         const int j = cy * view.width + cx;
         const float value = pixels[j].value;
-        if (value > 0.0f && begin <= end) {
+        if (value > 0.0f && begin < end) {
             const float slope_x = pixels[j].slope_x, slope_y = pixels[j].slope_y, slack = pixels[j].slack, back = pixels[j].back;
             // How far behind the front the line is, where it enters and where it leaves.
             const float base = value + slope_x * (line.x - (float)cx - 0.5f) + slope_y * (line.y - (float)cy - 0.5f) - line.value;
@@ -276,26 +277,28 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
                 } else {
                     met.blocked |= hit;
                     if (hit && !all) return met;
-                    const float step = fabs(value - pixels[last].value);
                     met.crossed |= (a > slack) != (b > slack);
-                    met.crossed |= joined && was_behind != (a > slack) && step < pixels[j].joint;
                     met.behind |= fmax(a, b) > slack;
+                    // Between two pixels of one surface: the one that the line comes from, where it leaves it.
+                    const int by_x = enter_x > enter_y;
+                    const int from_x = by_x ? cx - (line.step_x > 0.0f ? 1 : -1) : cx, from_y = by_x ? cy : cy - (line.step_y > 0.0f ? 1 : -1);
+                    if (begin > line.from && from_x >= 0 && from_y >= 0 && from_x < view.width && from_y < view.height) {
+                        const int i = from_y * view.width + from_x;
+                        const float before = pixels[i].value + pixels[i].slope_x * (line.x - (float)from_x - 0.5f) + pixels[i].slope_y * (line.y - (float)from_y - 0.5f)
+                                             - line.value + begin * (pixels[i].slope_x * line.step_x + pixels[i].slope_y * line.step_y - line.step_value);
+                        met.crossed |= pixels[i].value > 0.0f && (before > pixels[i].slack) != (a > slack) && fabs(value - pixels[i].value) < pixels[j].joint;
+                    }
                 }
             }
-            was_behind = b > slack;
-            joined = 1;
-        } else {
-            if (through && solid) return met;
-            joined = 0;
+        } else if (through && solid) {
+            return met;
         }
-        last = j;
         t = end;
         if (ex < ey)
             cx += line.step_x > 0.0f ? 1 : -1;
         else
             cy += line.step_y > 0.0f ? 1 : -1;
     }
-    met.left = t < line.to || cx < 0 || cy < 0 || cx >= view.width || cy >= view.height;
     return met;
 }
 
