@@ -59,25 +59,17 @@ __kernel void reduce_nearest(const int2 from, __global const float* restrict dep
     texels[y * size.x + x] = (float2)(d, d > 0.0f ? 1.0f : 0.0f);
 }
 
-// nearest_of_texels: the pyramid's first level: the greatest disparity in each block of BLOCK x BLOCK texels; 0: the block is empty.
-__kernel void nearest_of_texels(const int2 size, __global const float2* restrict texels, const int2 blocks, __global float* restrict nearest)
+// nearest_of_block: a level of the pyramid from the one below: the greatest disparity in each block of BLOCK x BLOCK cells; 0: it is empty.
+//
+//   size, below   the level below, of which every `stride`-th float is a disparity: 2 for texels, 1 for levels
+//   blocks, nearest [blocks.y][blocks.x]
+__kernel void nearest_of_block(const int2 size, const int stride, __global const float* below, const int2 blocks, __global float* restrict nearest)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= blocks.x || y >= blocks.y) return;
     float d = 0.0f;
     for (int j = y * BLOCK; j < min((y + 1) * BLOCK, size.y); ++j)
-        for (int i = x * BLOCK; i < min((x + 1) * BLOCK, size.x); ++i) d = fmax(d, texels[j * size.x + i].x);
-    nearest[y * blocks.x + x] = d;
-}
-
-// nearest_of_blocks: each further level, from the one below.
-__kernel void nearest_of_blocks(const int2 size, __global const float* restrict below, const int2 blocks, __global float* restrict nearest)
-{
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= blocks.x || y >= blocks.y) return;
-    float d = 0.0f;
-    for (int j = y * BLOCK; j < min((y + 1) * BLOCK, size.y); ++j)
-        for (int i = x * BLOCK; i < min((x + 1) * BLOCK, size.x); ++i) d = fmax(d, below[j * size.x + i]);
+        for (int i = x * BLOCK; i < min((x + 1) * BLOCK, size.x); ++i) d = fmax(d, below[(j * size.x + i) * stride]);
     nearest[y * blocks.x + x] = d;
 }
 

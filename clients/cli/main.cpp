@@ -14,6 +14,7 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
+#include "heap.hpp"
 #include "scene/joined.hpp"
 #include "streams.hpp"
 #include "verbs.hpp"
@@ -90,6 +91,7 @@ CLI::App* add_verb(CLI::App& program, const char* name, const char* verb_summary
 int main(int argc, char** argv)
 {
     using namespace penumbra;
+    cli::use_huge_pages();
     try {
         return cli::run(argc, argv);
     } catch (const Error& error) {

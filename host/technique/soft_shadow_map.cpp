@@ -27,10 +27,11 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
         .map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program),
         .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
         .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
-    work.launch(prepared.program, "nearest_of_texels", grid_of(blocks), {16, 4}, count_of(size) * 8, cl_int2{{size.width, size.height}},
-                side.map.texels, cl_int2{{blocks.width, blocks.height}}, side.blocks);
-    work.launch(prepared.program, "nearest_of_blocks", grid_of(superblocks), {16, 4}, count_of(blocks) * 4,
-                cl_int2{{blocks.width, blocks.height}}, side.blocks, cl_int2{{superblocks.width, superblocks.height}}, side.superblocks);
+    const cl_int2 texels{{size.width, size.height}}, level_1{{blocks.width, blocks.height}}, level_2{{superblocks.width, superblocks.height}};
+    work.launch(prepared.program, "nearest_of_block", grid_of(blocks), {16, 4}, count_of(size) * 8, texels, 2, side.map.texels, level_1,
+                side.blocks);
+    work.launch(prepared.program, "nearest_of_block", grid_of(superblocks), {16, 4}, count_of(blocks) * 4, level_1, 1, side.blocks, level_2,
+                side.superblocks);
     return side;
 }
 
