@@ -34,6 +34,23 @@ OcclusionLevel level_of(int level, int side, LevelKind kind)
 
 } // namespace
 
+LevelKind level_kind(bool directional, const OcclusionTexture& settings)
+{
+    if (settings.prefilter == Prefilter::summed_area) return LevelKind::table;
+    if (settings.prefilter == Prefilter::mipmap) return LevelKind::mipmap;
+    return directional ? LevelKind::smooth : LevelKind::nbuffer;
+}
+
+std::size_t element_size(LevelKind kind, const OcclusionTexture& settings)
+{
+    return kind != LevelKind::table && settings.storage == LevelStorage::normalized16 ? 2 : 4;
+}
+
+bool is_layered(const OcclusionTexture& settings)
+{
+    return settings.combine == Combine::layered || settings.combine == Combine::layered_max;
+}
+
 int levels_for(double size, int side, LevelKind kind)
 {
     if (kind == LevelKind::table) return 1;

@@ -7,11 +7,10 @@
 
 #include "technique/keys.hpp"
 #include "technique/occlusion_levels.hpp"
+#include "technique/occlusion_prefilter.hpp"
 
 namespace penumbra {
 namespace {
-
-constexpr double most_taps = 16;
 
 constexpr Names<3> placement_names{"uniform", "reciprocal", "occupied"};
 constexpr Names<3> prefilter_names{"nbuffer", "mipmap", "summed_area"};
@@ -24,18 +23,6 @@ static_assert(static_cast<int>(Combine::product) == COMBINE_PRODUCT && static_ca
 static_assert(static_cast<int>(Combine::max) == COMBINE_MAX && static_cast<int>(Combine::layered) == COMBINE_LAYERED);
 static_assert(static_cast<int>(Combine::layered_max) == COMBINE_LAYERED_MAX);
 
-LevelKind level_kind(bool directional, const OcclusionTexture& settings)
-{
-    if (settings.prefilter == Prefilter::summed_area) return LevelKind::table;
-    if (settings.prefilter == Prefilter::mipmap) return LevelKind::mipmap;
-    return directional ? LevelKind::smooth : LevelKind::nbuffer;
-}
-
-std::size_t element_size(LevelKind kind, const OcclusionTexture& settings)
-{
-    return kind != LevelKind::table && settings.storage == LevelStorage::normalized16 ? 2 : 4;
-}
-
 opencl::Specialisation program(int lanes, LevelKind kind, const OcclusionTexture& settings)
 {
     return {"occlusion_texture.cl",
@@ -44,11 +31,6 @@ opencl::Specialisation program(int lanes, LevelKind kind, const OcclusionTexture
              choice_constant("PREFILTER", level_names, kind),
              choice_constant("STORAGE", storage_names,
                              element_size(kind, settings) == 2 ? LevelStorage::normalized16 : LevelStorage::binary32)}};
-}
-
-bool is_layered(const OcclusionTexture& settings)
-{
-    return settings.combine == Combine::layered || settings.combine == Combine::layered_max;
 }
 
 void check_settings(const LightFrame& light, const OcclusionTexture& settings)
@@ -65,226 +47,12 @@ void check_settings(const LightFrame& light, const OcclusionTexture& settings)
         refuse("placement", "is reciprocal and the light directional", "expected uniform or occupied: such a light has no nearest depth");
 }
 
-// The slices' planes as shading needs them, all layers of each.
-std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<float>& depths, const SlicePart& part,
-                                      const OcclusionTexture& settings)
-{
-    const bool layered = is_layered(settings);
-    std::vector<OcclusionPlane> planes;
-    for (std::size_t k = 0; k + 1 < depths.size(); ++k) {
-        const double near = depths[k], far = depths[k + 1], next = k + 2 < depths.size() ? depths[k + 2] : far + (far - near);
-        const double per = view.orthographic ? 1 : 1 / (far + static_cast<double>(view.behind));
-        const double along = view.orthographic ? 1 : far * per;
-        // A receiver on the plane itself does not count as beyond it, whatever rounding made of its depth.
-        const double beyond = far + 0x1p-20 * std::abs(far);
-        const bool own = settings.self_shadow == SelfShadow::own;
-        const double from = own ? near : beyond, to = settings.self_shadow == SelfShadow::omit ? beyond : own ? far : next;
-        OcclusionPlane plane{.slice = static_cast<int>(k),
-                             .layer = -1,
-                             .levels = 1,
-                             .at_x = static_cast<float>(along * view.per_x),
-                             .at_y = static_cast<float>(along * view.per_y),
-                             .half_x = static_cast<float>(part.half_u * per * view.per_x),
-                             .half_y = static_cast<float>(part.half_v * per * view.per_y),
-                             .far = static_cast<float>(far),
-                             .fade_from = static_cast<float>(from),
-                             .per_fade = to > from ? static_cast<float>(std::min(1 / (to - from), 1e30)) : 1e30F};
-        for (int layer = 0; layer < (layered ? settings.layers : 1); ++layer) {
-            if (layered) plane.layer = layer;
-            planes.push_back(plane);
-        }
-    }
-    return planes;
-}
-
-// Lookups along each axis: kernels that are longer than wide are made of square ones.
-std::array<int, 2> taps_of(const std::vector<OcclusionPlane>& planes)
-{
-    double x = 1, y = 1;
-    for (const OcclusionPlane& plane : planes) {
-        x = std::max(x, 2.0 * plane.half_x);
-        y = std::max(y, 2.0 * plane.half_y);
-    }
-    const auto taps = [](double ratio) { return static_cast<int>(std::clamp(std::ceil(ratio * (1 - 0x1p-20)), 1.0, most_taps)); };
-    return {taps(x / y), taps(y / x)};
-}
-
-// The marked slices of one part.
-struct Marked {
-    SliceView view{};
-    std::vector<OcclusionPlane> planes; // those that hold anything
-    std::array<int, 2> taps{1, 1};
-    opencl::Buffer<cl_uint> occupancy;
-};
-
-struct Scenery {
-    const LightFrame& light;
-    SliceCasters casters;
-    SliceRange range;
-    std::vector<float> depths;
-    opencl::Buffer<float> vertices, planes;
-    opencl::Buffer<cl_int> triangles, large;
-    const SolidMaps* solid;
-    opencl::Buffer<float> front, back;
-};
-
-cl_int2 size_of(const SliceView& view) { return {{view.width, view.height}}; }
-
-void mark_triangles(opencl::Work& work, const opencl::Specialisation& program, const Scenery& scenery, const SliceView& view,
-                    const opencl::Buffer<cl_uint>& occupancy)
-{
-    const std::size_t count = scenery.casters.triangles.size() / 3;
-    if (count == 0) return;
-    const cl_int none = 0;
-    const auto listed = work.upload(std::span<const cl_int>(&none, 1), "number of large triangles");
-    work.launch(program, "slice_triangles", {count, 1}, {64, 1}, count * 48, view, static_cast<cl_int>(count), scenery.vertices,
-                scenery.triangles, scenery.planes, occupancy, scenery.large, listed);
-    work.launch(program, "slice_large", {4096, 1}, {64, 1}, 0, view, scenery.vertices, scenery.triangles, scenery.planes, occupancy,
-                scenery.large, listed);
-}
-
-void mark_solid(opencl::Work& work, const opencl::Specialisation& program, const Scenery& scenery, const SliceView& view,
-                const opencl::Buffer<cl_uint>& occupancy)
-{
-    if (!scenery.solid) return;
-    const auto& [front, back, camera] = *scenery.solid;
-    const cl_float2 per{
-        {static_cast<float>(front.width / (2 * camera.half_extent.x)), static_cast<float>(front.height / (2 * camera.half_extent.y))}};
-    const Vec3 origin = light_from_world(scenery.light, camera.frame.origin);
-    const cl_float4 from{{static_cast<float>(origin.x), static_cast<float>(origin.y), static_cast<float>(origin.z), 0}};
-    const std::size_t side = static_cast<std::size_t>(view.width);
-    work.launch(program, "fill_between", {side, side}, {16, 1}, side * side * 8, view, cl_int2{{front.width, front.height}}, per, from,
-                scenery.front, scenery.back, scenery.planes, occupancy);
-}
-
-Marked marked_slices(opencl::Work& work, const opencl::Specialisation& program, const Scenery& scenery, const SlicePart& part,
-                     const OcclusionTexture& settings)
-{
-    Marked marked;
-    marked.view = slice_view(scenery.casters, scenery.range, part, settings.resolution, settings.slices, scenery.light.directional);
-    const std::size_t side = static_cast<std::size_t>(settings.resolution);
-    marked.occupancy = work.upload(std::span<const cl_uint>(std::vector<cl_uint>(2 * side * side)), "slices");
-    mark_triangles(work, program, scenery, marked.view, marked.occupancy);
-    mark_solid(work, program, scenery, marked.view, marked.occupancy);
-
-    const std::vector<OcclusionPlane> all = planes_of(marked.view, scenery.depths, part, settings);
-    marked.taps = taps_of(all);
-    const auto planes = work.upload(std::span<const OcclusionPlane>(all), "planes of slices");
-    const auto counts = work.upload(std::span<const cl_int>(std::vector<cl_int>(all.size())), "filled texels");
-    work.launch(program, "count_filled", {side, all.size()}, {16, 1}, side * side * 8 * all.size(), size_of(marked.view),
-                static_cast<cl_int>(all.size()), static_cast<cl_int>(settings.layers - 1), static_cast<cl_int>(settings.leak_fix), planes,
-                marked.occupancy, counts);
-    const std::vector<cl_int> filled = work.read(counts);
-    for (std::size_t i = 0; i < all.size(); ++i)
-        if (filled[i] > 0) marked.planes.push_back(all[i]);
-    return marked;
-}
-
-// How many levels each plane needs, for receivers however far away.
-void set_levels(Marked& marked, LevelKind kind, bool directional)
-{
-    for (OcclusionPlane& plane : marked.planes) {
-        const double size = std::max(2.0 * plane.half_x / marked.taps[0], 2.0 * plane.half_y / marked.taps[1]);
-        plane.levels = levels_for(directional && size > 0 ? 1e30 : size, marked.view.width, kind);
-    }
-}
-
-LevelLayout layout_of(const Marked& marked, LevelKind kind)
-{
-    const std::uint64_t side = static_cast<std::uint64_t>(marked.view.width);
-    if (kind == LevelKind::table) return {.levels = {}, .textures = {}, .elements = marked.planes.size() * (side + 1) * (side + 1)};
-    std::vector<int> levels;
-    for (const OcclusionPlane& plane : marked.planes) levels.push_back(plane.levels);
-    return level_layout(levels, marked.view.width, kind);
-}
-
-// What the same slices would take with `side` texels: kernels have fewer texels in proportion.
-std::uint64_t elements_at(Marked marked, int side, LevelKind kind, bool directional)
-{
-    const float scale = static_cast<float>(side) / static_cast<float>(marked.view.width);
-    marked.view.width = marked.view.height = side;
-    for (OcclusionPlane& plane : marked.planes) {
-        plane.half_x *= scale;
-        plane.half_y *= scale;
-    }
-    set_levels(marked, kind, directional);
-    return layout_of(marked, kind).elements;
-}
-
-// A hint that holds: resolutions are tried, and slices counted as the largest of them, the nearest.
-std::string what_fits(const Marked& marked, std::uint64_t most, LevelKind kind, bool directional, const OcclusionTexture& settings)
-{
-    int fits = 0;
-    for (int low = 4, high = settings.resolution; low <= high;) {
-        const int side = (low + high) / 2;
-        if (elements_at(marked, side, kind, directional) <= most) {
-            fits = side;
-            low = side + 1;
-        } else {
-            high = side - 1;
-        }
-    }
-    Marked nearest = marked;
-    nearest.planes.resize(1);
-    const bool layered = is_layered(settings);
-    const std::uint64_t slices = most / layout_of(nearest, kind).elements / static_cast<std::uint64_t>(layered ? settings.layers : 1);
-    if (fits == 0)
-        return slices == 0 ? "expected fewer slices and a lower resolution" : "expected at most " + std::to_string(slices) + " slices";
-    return "a resolution of " + std::to_string(fits) + " would fit" +
-           (slices == 0 ? "" : ", or " + std::to_string(std::min(slices, static_cast<std::uint64_t>(settings.slices))) + " slices");
-}
-
-void check_memory(const opencl::Context& context, const Marked& marked, std::uint64_t elements, LevelKind kind, bool directional,
-                  const OcclusionTexture& settings)
-{
-    const DeviceInfo& device = context.info();
-    const std::uint64_t most = std::min(device.max_allocation_bytes, device.global_bytes), size = element_size(kind, settings);
-    if (elements * size <= most) return;
-    throw Error::at(ErrorCode::too_large, "technique.resolution",
-                    std::to_string(settings.slices) + " slices of " + std::to_string(settings.resolution) + " texels each way take " +
-                        std::to_string(elements * size) + " bytes, the device allows " + std::to_string(most),
-                    what_fits(marked, most / size, kind, directional, settings));
-}
-
-void build_tables(opencl::Work& work, const opencl::Specialisation& program, const Marked& marked, const OcclusionTexture& settings,
-                  const opencl::Buffer<OcclusionPlane>& planes, const opencl::Buffer<cl_uchar>& data)
-{
-    const std::size_t side = static_cast<std::size_t>(marked.view.width), count = marked.planes.size();
-    work.launch(program, "table_rows", {side + 1, count}, {16, 1}, side * side * 8 + data.bytes(), size_of(marked.view),
-                static_cast<cl_int>(count), static_cast<cl_int>(settings.layers - 1), static_cast<cl_int>(settings.leak_fix), planes,
-                marked.occupancy, data);
-    work.launch(program, "table_columns", {side + 1, count}, {16, 1}, 2 * data.bytes(), size_of(marked.view), static_cast<cl_int>(count),
-                data);
-}
-
-void build_levels(opencl::Work& work, const opencl::Specialisation& program, const Marked& marked, const OcclusionTexture& settings,
-                  LevelKind kind, const LevelLayout& layout, const opencl::Buffer<OcclusionPlane>& planes,
-                  const opencl::Buffer<cl_uchar>& data)
-{
-    const std::uint64_t size = element_size(kind, settings);
-    const auto grid = [&](std::size_t level) {
-        return static_cast<std::size_t>(layout.levels[level].rows) * static_cast<std::size_t>(layout.textures[level]);
-    };
-    const auto bytes = [&](std::size_t level) { return grid(level) * static_cast<std::size_t>(layout.levels[level].stride) * size; };
-    const std::size_t columns = work.context().quirks().lanes == 1 ? 1 : 16; // COLUMNS of occlusion_levels.cl
-    work.launch(program, "first_level", {static_cast<std::size_t>(layout.levels[0].stride) / columns, grid(0)}, {1, 16}, bytes(0),
-                size_of(marked.view), layout.textures[0], static_cast<cl_int>(settings.layers - 1), static_cast<cl_int>(settings.leak_fix),
-                layout.levels[0], planes, marked.occupancy, data);
-    for (std::size_t level = 1; level < layout.levels.size(); ++level) {
-        const cl_int half = 1 << (level - 1), apart = kind == LevelKind::nbuffer ? half / 2 : half;
-        const std::uint64_t below =
-            bytes(level - 1) / static_cast<std::uint64_t>(layout.textures[level - 1]) * static_cast<std::uint64_t>(layout.textures[level]);
-        work.launch(program, "next_level", {static_cast<std::size_t>(layout.levels[level].stride) / 16, grid(level)}, {1, 16},
-                    below + bytes(level), layout.levels[level - 1], layout.levels[level], layout.textures[level], apart, data);
-    }
-}
-
-PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Specialisation& program, const Scenery& scenery,
+PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Specialisation& program, const SliceScenery& scenery,
                                        const SlicePart& part, float share, const OcclusionTexture& settings, std::string& note)
 {
     const LevelKind kind = level_kind(scenery.light.directional, settings);
     work.stage("slices");
-    Marked marked = marked_slices(work, program, scenery, part, settings);
+    MarkedSlices marked = marked_slices(work, program, scenery, part, settings);
     set_levels(marked, kind, scenery.light.directional);
     const LevelLayout layout = layout_of(marked, kind);
     const std::uint64_t bytes = layout.elements * element_size(kind, settings);
@@ -316,54 +84,6 @@ PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Special
                 " of the furthest";
     }
     return prepared;
-}
-
-std::vector<SlicePart> parts_of(const LightFrame& light, int splits)
-{
-    std::vector<SlicePart> parts;
-    const double half_u = light.half_u / splits, half_v = light.half_v / splits;
-    for (int j = 0; j < splits; ++j)
-        for (int i = 0; i < splits; ++i)
-            parts.push_back(
-                {.centre_x = (2 * i + 1 - splits) * half_u, .centre_y = (2 * j + 1 - splits) * half_v, .half_u = half_u, .half_v = half_v});
-    return parts;
-}
-
-Scenery scenery_of(opencl::Work& work, const LightFrame& frame, std::span<const TriangleMesh* const> meshes, const SolidMaps* solid,
-                   const OcclusionTexture& settings)
-{
-    Scenery scenery{.light = frame,
-                    .casters = slice_casters(frame, meshes),
-                    .range = {},
-                    .depths = {},
-                    .vertices = {},
-                    .planes = {},
-                    .triangles = {},
-                    .large = {},
-                    .solid = solid,
-                    .front = {},
-                    .back = {}};
-    scenery.range = slice_range(scenery.casters, frame.directional);
-    if (!(scenery.range.near <= scenery.range.far) || (!frame.directional && !(scenery.range.far > 0))) return scenery;
-    scenery.depths = slice_depths(scenery.casters, scenery.range, settings.slices, settings.placement, frame.directional);
-    scenery.vertices = work.upload(std::span<const float>(scenery.casters.vertices), "vertices");
-    scenery.triangles = work.upload(std::span<const cl_int>(scenery.casters.triangles), "triangles");
-    scenery.large = work.buffer<cl_int>(scenery.casters.triangles.size() / 3, "large triangles");
-    scenery.planes = work.upload(std::span<const float>(scenery.depths), "depths of slices");
-    if (solid) {
-        scenery.front = work.upload(std::span<const float>(solid->front.depth), "front occluder depth");
-        scenery.back = work.upload(std::span<const float>(solid->back.depth), "back occluder depth");
-    }
-    return scenery;
-}
-
-// What the maps show as triangles: of both sides of the solid, and of further layers.
-std::vector<TriangleMesh> surfaces_of(const LightDepth& maps)
-{
-    std::vector<TriangleMesh> meshes{mesh_of_texels(*maps.front, maps.camera)};
-    if (maps.back) meshes.push_back(mesh_of_texels(*maps.back, maps.camera));
-    for (const DepthMap& layer : maps.layers) meshes.push_back(mesh_of_texels(layer, maps.camera));
-    return meshes;
 }
 
 } // namespace
@@ -423,7 +143,7 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
             prepared.view = light_camera(frame, {1, 1}, frame.origin);
         }
     }
-    const Scenery scenery = scenery_of(work, frame, meshes, solid, settings);
+    const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings);
     if (scenery.depths.empty()) {
         prepared.warnings.push_back("nothing that casts lies before the light: nothing casts shadows");
         return prepared;
@@ -438,7 +158,7 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
                                     std::to_string(scenery.range.near) + ": what is nearer casts nothing");
     const int splits = frame.half_u > 0 || frame.half_v > 0 ? settings.light_splits : 1;
     float before = 0; // as the device adds the shares up; the last one makes them 1 to the bit
-    for (const SlicePart& part : parts_of(frame, splits)) {
+    for (const SlicePart& part : slice_parts(frame, splits)) {
         std::string note;
         const bool last = prepared.parts.size() + 1 == static_cast<std::size_t>(splits * splits);
         const float share = last ? 1 - before : 1.0F / static_cast<float>(splits * splits);
@@ -480,7 +200,7 @@ PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, con
     std::vector<const TriangleMesh*> meshes = casting.meshes;
     if (meshes.empty()) {
         work.stage("surfaces of depth maps");
-        surfaces = surfaces_of(maps);
+        surfaces = surfaces_of(maps, true);
         for (const TriangleMesh& mesh : surfaces) meshes.push_back(&mesh);
     }
     std::optional<SolidMaps> solid;

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "scene/camera.hpp"
+#include "technique/occlusion_slices.hpp"
 #include "technique/receiver_points.hpp"
-#include "technique/slice_fit.hpp"
 #include "technique/table.hpp"
 #include "technique/verbs.hpp"
 
@@ -25,12 +25,6 @@ struct PreparedOcclusionTexture {
     Camera view; // that receivers are to come in
     std::vector<Part> parts;
     std::vector<std::string> warnings, notes;
-};
-
-// The solid between two maps of the light's own view, planar depth: filled in beside the casters' surfaces.
-struct SolidMaps {
-    const DepthMap &front, &back;
-    Camera camera;
 };
 
 // `meshes`: the surfaces that cast, in world space. Throws invalid_input for settings that do not go together or with the light, too_large

@@ -27,7 +27,8 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
         .map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program),
         .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
         .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
-    const cl_int2 texels{{size.width, size.height}}, level_1{{blocks.width, blocks.height}}, level_2{{superblocks.width, superblocks.height}};
+    const cl_int2 texels{{size.width, size.height}}, level_1{{blocks.width, blocks.height}},
+        level_2{{superblocks.width, superblocks.height}};
     work.launch(prepared.program, "nearest_of_block", grid_of(blocks), {16, 4}, count_of(size) * 8, texels, 2, side.map.texels, level_1,
                 side.blocks);
     work.launch(prepared.program, "nearest_of_block", grid_of(superblocks), {16, 4}, count_of(blocks) * 4, level_1, 1, side.blocks, level_2,

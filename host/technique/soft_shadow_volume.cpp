@@ -175,10 +175,10 @@ void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolu
     const LightFrame frame = light_frame(light);
     const int table = prepared.settings.table, splits = static_cast<int>(std::lround(std::sqrt(prepared.parts.size())));
     const EmissionSums emission = emission_sums(emission_of(light), 2 * table);
-    const EmissionPart whole = emission_part(emission, parts_of(frame, 1).front(), 1);
+    const EmissionPart whole = emission_part(emission, light_parts(frame, 1).front(), 1);
     prepared.channels = emission.channels;
     prepared.program = program(work.context().quirks().lanes, frame.shape, prepared.settings, emission.channels);
-    const std::vector<LightPart> parts = parts_of(frame, splits);
+    const std::vector<LightPart> parts = light_parts(frame, splits);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const EmissionPart lit = emission_part(emission, parts[i], splits);
         prepared.parts[i].coverage = coverage_table(work, prepared.program, emission, lit, table);
@@ -197,11 +197,10 @@ cl_float4 eye_of(const ReceiverView& view, const WedgeLight& light, bool wanted)
     return {{x / z * light.scale_x - light.centre_x * d, y / z * light.scale_y - light.centre_y * d, d, 1}};
 }
 
-// Surfaces that the occluder maps show, where there are no objects: every map's sheets of texels.
+// Of the surfaces that the occluder maps show, where there are no objects.
 Topology topology_of_maps(const LightDepth& maps)
 {
-    std::vector<TriangleMesh> meshes{mesh_of_texels(*maps.front, maps.camera)};
-    for (const DepthMap& layer : maps.layers) meshes.push_back(mesh_of_texels(layer, maps.camera));
+    const std::vector<TriangleMesh> meshes = surfaces_of(maps, false);
     std::vector<const TriangleMesh*> pointers;
     for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
     return Topology(pointers);
@@ -277,7 +276,7 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
                                       .warnings = {}};
     const bool linear = extent && settings.coverage == Coverage::linear;
     std::uint64_t left_out = 0, unshared = 0;
-    const std::vector<LightPart> parts = parts_of(frame, splits);
+    const std::vector<LightPart> parts = light_parts(frame, splits);
     // As many parts at a time as there are threads: the host never holds the wedges of all.
     std::vector<PartWedges> batch(std::min<std::size_t>(thread_count(), parts.size()));
     for (std::size_t first = 0; first < parts.size(); first += batch.size()) {

@@ -26,4 +26,12 @@ ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const o
     return receiver_points(work, view, receivers.device_depth, 0x1p-24, program);
 }
 
+std::vector<TriangleMesh> surfaces_of(const LightDepth& maps, bool back)
+{
+    std::vector<TriangleMesh> meshes{mesh_of_texels(*maps.front, maps.camera)};
+    if (back && maps.back) meshes.push_back(mesh_of_texels(*maps.back, maps.camera));
+    for (const DepthMap& layer : maps.layers) meshes.push_back(mesh_of_texels(layer, maps.camera));
+    return meshes;
+}
+
 } // namespace penumbra

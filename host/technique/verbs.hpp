@@ -62,6 +62,9 @@ struct LightDepth {
     cl::Buffer device_front, device_back; // where the caller has it on the device already
 };
 
+// What the maps show as triangles, each map's sheets of texels: of the front and of further layers, and with `back` of the back.
+std::vector<TriangleMesh> surfaces_of(const LightDepth& maps, bool back);
+
 // What prepare is handed. Everything stays the caller's and lives as long as the call.
 struct Casting {
     const Light& light;

@@ -304,7 +304,7 @@ Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& p
             rounded(from.dot(light.direction) / part.half.z)};
 }
 
-std::vector<LightPart> parts_of(const LightFrame& light, int splits)
+std::vector<LightPart> light_parts(const LightFrame& light, int splits)
 {
     const double longer = std::max(light.half_u, light.half_v);
     const auto extent = [&](double half) { return longer == 0 ? 1.0 : std::max(half, longer * 0x1p-12); };

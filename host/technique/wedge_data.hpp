@@ -20,7 +20,7 @@ struct LightPart {
 
 // n x n parts of a rectangle; of any other light one. An extent of 0 beside another counts as 2^-12 of that; two of 0 as 1, which no edge
 // is then tested against.
-std::vector<LightPart> parts_of(const LightFrame& light, int splits);
+std::vector<LightPart> light_parts(const LightFrame& light, int splits);
 
 // A point of the world in the part's light space, in `half`, as the device has it: rounded to binary32.
 Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& point);

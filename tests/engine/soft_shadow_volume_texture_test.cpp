@@ -65,7 +65,7 @@ std::vector<double> rounding_of(const RectangleLight& light, const std::vector<T
     const Topology topology(pointers);
     const LightFrame frame = light_frame(light);
     std::vector<double> bounds(size * size, 0x1p-22); // of 1 less the sum
-    for (const LightPart& part : parts_of(frame, splits)) {
+    for (const LightPart& part : light_parts(frame, splits)) {
         std::vector<std::array<Vec3, 2>> edges;
         for (const SilhouetteEdge& edge : silhouette_of(topology, part.centre).edges)
             edges.push_back({point_in_part(frame, part, Vec3(topology.vertices()[edge.from])),

@@ -364,7 +364,7 @@ TEST(LinearWedges, CornerWedgesGoByTheAngle)
     const auto count = [&](const TriangleMesh& mesh, int most) {
         const TriangleMesh* const meshes[] = {&mesh};
         const Topology topology(meshes);
-        const LightPart part = parts_of(light, 1).front();
+        const LightPart part = light_parts(light, 1).front();
         return linear_wedges(topology, silhouette_of(topology, light.origin), light, part, false, most).corner_wedges;
     };
     EXPECT_EQ(count(polygon({{-1, -1, -4}, {1, -1, -4}, {1, 1, -4}, {-1, 1, -4}}), 16), 0u);

@@ -99,7 +99,7 @@ public:
         shape_ = frame.shape == LightShape::disc ? oracle::wedge::Shape::disc : oracle::wedge::Shape::square;
         origin_ = frame.origin;
         const Topology topology = topology_of(c.casters);
-        for (const LightPart& part : parts_of(frame, c.settings.light_splits)) {
+        for (const LightPart& part : light_parts(frame, c.settings.light_splits)) {
             const Silhouette silhouette = silhouette_of(topology, part.centre);
             Part own{.part = part, .sheets = std::vector<oracle::wedge::Sheet>(silhouette.sheets())};
             for (std::size_t s = 0; s < silhouette.sheets(); ++s) {

@@ -11,7 +11,7 @@ WedgeData data_of(const std::vector<TriangleMesh>& meshes, const Light& light, b
 {
     const LightFrame frame = light_frame(light);
     const Topology topology = topology_of(meshes);
-    const LightPart own = parts_of(frame, splits).at(part);
+    const LightPart own = light_parts(frame, splits).at(part);
     return wedge_data(topology, silhouette_of(topology, own.centre), frame, own, apart, edges_too);
 }
 
@@ -19,7 +19,7 @@ TEST(LightParts, CoverTheRectangle)
 {
     const LightFrame frame = light_frame(rectangle_light(0.75, 0.5));
     for (const int splits : {1, 2, 3, 16}) {
-        const std::vector<LightPart> parts = parts_of(frame, splits);
+        const std::vector<LightPart> parts = light_parts(frame, splits);
         ASSERT_EQ(parts.size(), static_cast<std::size_t>(splits * splits));
         double share = 0, low = 1e9, high = -1e9;
         Vec3 middle(0, 0, 0);
@@ -41,16 +41,16 @@ TEST(LightParts, CoverTheRectangle)
 
 TEST(LightParts, LightsWithoutExtent)
 {
-    const std::vector<LightPart> line = parts_of(light_frame(rectangle_light(2, 0)), 2);
+    const std::vector<LightPart> line = light_parts(light_frame(rectangle_light(2, 0)), 2);
     ASSERT_EQ(line.size(), 4u);
     EXPECT_EQ(line[0].half.y, 2 * 0x1p-12 / 2);
     for (const Light& light : {Light(point_light()), Light(sphere_light(0))}) {
-        const std::vector<LightPart> point = parts_of(light_frame(light), 3);
+        const std::vector<LightPart> point = light_parts(light_frame(light), 3);
         ASSERT_EQ(point.size(), 1u);
         EXPECT_EQ(point[0].half, Vec3(1, 1, 1));
         EXPECT_EQ(point[0].share, 1);
     }
-    EXPECT_EQ(parts_of(light_frame(sphere_light(0.25)), 1).front().half, Vec3(0.25, 0.25, 0.25));
+    EXPECT_EQ(light_parts(light_frame(sphere_light(0.25)), 1).front().half, Vec3(0.25, 0.25, 0.25));
 }
 
 TEST(WedgeData, CountsAndPadding)
@@ -129,7 +129,7 @@ TEST(WedgeData, SidesOfSurfacesThatAreNotClosed)
 TEST(WedgeData, EdgesInTheUnitsOfTheLight)
 {
     const WedgeData data = data_of({sheet(-1, 1, -2, 2, 4)}, rectangle_light(0.5, 0.25), true, true, 2, 3);
-    const LightPart part = parts_of(light_frame(rectangle_light(0.5, 0.25)), 2).at(3);
+    const LightPart part = light_parts(light_frame(rectangle_light(0.5, 0.25)), 2).at(3);
     for (std::size_t i = 0; i < 4; ++i) {
         const float* edge = data.edges.data() + 8 * i;
         for (const std::size_t end : {0u, 3u}) {
