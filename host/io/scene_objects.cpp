@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "io/mesh_io.hpp"
@@ -107,10 +108,8 @@ void place(SeenSurface& seen, const JsonObject& section)
     frame = {.origin = placement.placed(frame.origin), .x = placement.turned(frame.x), .y = placement.turned(frame.y), .z = placement.turned(frame.z)};
     if (placement.scale == 1) return;
     const auto scale = static_cast<float>(placement.scale);
-    for (float& depth : seen.depth.depth) {
-        depth *= scale;
-        if (!(depth > 0)) throw section.value().error("has depths that scale makes 0", "scale is too small");
-    }
+    // As the corners of a mesh do, depths end in one point when they are too small for float32.
+    for (float& depth : seen.depth.depth) depth = std::max(depth * scale, std::numeric_limits<float>::min());
     if (seen.camera.orthographic) seen.camera.half_extent *= placement.scale;
     seen.depth.step.depth *= placement.scale;
     seen.depth.step.disparity /= placement.scale;

@@ -200,6 +200,21 @@ DEPTH_FUNCTION float depth_border(const int at, const int side, const float star
     return step != 0.0f ? ((float)((at + plus) * side) - start) * inverse : (ahead ? 3e38f : -3e38f);
 }
 
+// Whether a line goes through the surface that two neighbouring pixels show, where it goes from the first (x0, y0) to the second, at t.
+DEPTH_FUNCTION int depth_between(const DepthView view, DEPTH_MEMORY DepthPixel* pixels, const DepthLine line, const int x0, const int y0, const int x1,
+                                 const int y1, const float t)
+{
+    if (x0 < 0 || y0 < 0 || x0 >= view.width || y0 >= view.height || x1 < 0 || y1 < 0 || x1 >= view.width || y1 >= view.height) return 0;
+    const DepthPixel first = pixels[y0 * view.width + x0], second = pixels[y1 * view.width + x1];
+    if (!(first.value > 0.0f) || !(second.value > 0.0f) || !(fabs(second.value - first.value) < second.joint)) return 0;
+    const float base0 = first.value + first.slope_x * (line.x - (float)x0 - 0.5f) + first.slope_y * (line.y - (float)y0 - 0.5f) - line.value;
+    const float base1 = second.value + second.slope_x * (line.x - (float)x1 - 0.5f) + second.slope_y * (line.y - (float)y1 - 0.5f) - line.value;
+    const float a = base0 + t * (first.slope_x * line.step_x + first.slope_y * line.step_y - line.step_value);
+    const float b = base1 + t * (second.slope_x * line.step_x + second.slope_y * line.step_y - line.step_value);
+    const float own = depth_own(line.own, base1, second.slack, second.slope_x, second.slope_y, second.value);
+    return t * (fabs(line.step_x) + fabs(line.step_y)) >= own && (a > first.slack) != (b > second.slack);
+}
+
 // Where a line first meets the image, or (with `all`) everything that it meets; with `through` the first solid's extent as well.
 //
 //   pixels [height][width], nearest: the pyramid's levels, one after the other; levels: how many of them are used (0: every pixel is looked at)
@@ -279,17 +294,16 @@ DEPTH_FUNCTION DepthMet depth_walk(const DepthView view, DEPTH_MEMORY DepthPixel
                     if (hit && !all) return met;
                     met.crossed |= (a > slack) != (b > slack);
                     met.behind |= fmax(a, b) > slack;
-                    // Between two pixels of one surface: the one that the line comes from, where it leaves it.
-                    const int by_x = enter_x > enter_y;
-                    const int from_x = by_x ? cx - (line.step_x > 0.0f ? 1 : -1) : cx, from_y = by_x ? cy : cy - (line.step_y > 0.0f ? 1 : -1);
-                    if (begin > line.from && from_x >= 0 && from_y >= 0 && from_x < view.width && from_y < view.height) {
-                        const int i = from_y * view.width + from_x;
-                        const float before = pixels[i].value + pixels[i].slope_x * (line.x - (float)from_x - 0.5f) + pixels[i].slope_y * (line.y - (float)from_y - 0.5f)
-                                             - line.value + begin * (pixels[i].slope_x * line.step_x + pixels[i].slope_y * line.step_y - line.step_value);
-                        met.crossed |= pixels[i].value > 0.0f && (before > pixels[i].slack) != (a > slack) && fabs(value - pixels[i].value) < pixels[j].joint;
-                    }
                 }
             }
+            // Between two pixels of one surface: where the line comes from, and where it goes. A line that meets neither passes above both, so
+            // each pair is looked at, whatever the pyramid passes over. Lines through a corner cross at neither side of it.
+            if (!through && begin > line.from && enter_x != enter_y)
+                met.crossed |= depth_between(view, pixels, line, enter_x > enter_y ? cx - (line.step_x > 0.0f ? 1 : -1) : cx,
+                                             enter_x > enter_y ? cy : cy - (line.step_y > 0.0f ? 1 : -1), cx, cy, begin);
+            if (!through && end < line.to && ex != ey)
+                met.crossed |= depth_between(view, pixels, line, cx, cy, ex < ey ? cx + (line.step_x > 0.0f ? 1 : -1) : cx,
+                                             ex < ey ? cy : cy + (line.step_y > 0.0f ? 1 : -1), end);
         } else if (through && solid) {
             return met;
         }

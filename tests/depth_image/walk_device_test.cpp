@@ -25,7 +25,7 @@ DepthLight light_of(int count)
     light.half_u[0] = .2f, light.half_v[1] = .1f, light.half_v[2] = .1f;
     light.samples = samples;
     light.count = count;
-    light.own = 1;
+    light.own = DEPTH_OWN_PIXELS;
     light.seed_low = std::bit_cast<int>(static_cast<std::uint32_t>(seed));
     light.seed_high = std::bit_cast<int>(static_cast<std::uint32_t>(seed >> 32));
     return light;

@@ -70,7 +70,8 @@ TEST(DepthWalk, LinesThatEndInsideTheImageHaveNotLeftIt)
             const DepthLine line = random_line(random, image.view);
             const double x = line.x + static_cast<double>(line.to) * line.step_x, y = line.y + static_cast<double>(line.to) * line.step_y;
             // A tenth of a pixel off the border is far beyond rounding.
-            if (!(line.from < line.to) || !(std::min(x, y) > .1) || !(x < c.width - .1) || !(y < c.height - .1)) continue;
+            const bool starts_inside = line.x >= 0 && line.y >= 0 && line.x < static_cast<float>(c.width) && line.y < static_cast<float>(c.height);
+            if (!starts_inside || !(line.from < line.to) || !(std::min(x, y) > .1) || !(x < c.width - .1) || !(y < c.height - .1)) continue;
             ++checked;
             left += walk(image, 0, line, 1, 0).left + walk(image, DEPTH_LEVELS, line, 1, 0).left;
         }

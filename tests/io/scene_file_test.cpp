@@ -138,8 +138,12 @@ TEST(SceneFile, DepthImagesBecomeObjects)
     const Scene scene = parse(scene_of(with_object(
         R"({"depth": "depth.exr", "camera": {"kind": "pinhole", "eye": [0, 0, 5], "target": [0, 0, 0], "vertical_fov_deg": 60}, "translate": [0, 0, 1]})")));
     ASSERT_EQ(scene.objects.size(), 1u);
-    EXPECT_EQ(scene.objects[0].mesh.triangles.size(), 12u) << "3 x 2 squares between 4 x 3 pixel centres";
-    for (const auto& p : scene.objects[0].mesh.positions) EXPECT_NEAR(p.z, 4, 8 * 0x1p-24) << "depth 2 before z = 5, then moved by 1";
+    ASSERT_TRUE(scene.objects[0].seen);
+    const SeenSurface& seen = *scene.objects[0].seen;
+    EXPECT_TRUE(seen.depth.from_image);
+    EXPECT_EQ(seen.depth.depth, std::vector<float>(12, 2)) << "4 x 3 pixels at depth 2";
+    EXPECT_EQ(seen.camera.frame.origin, Vec3(0, 0, 6)) << "the camera at z = 5, moved by 1";
+    EXPECT_EQ(seen.thickness, 0) << "auto";
     EXPECT_EQ(parse(scene_of(with_object(R"({"depth": "empty.exr", "camera": {"kind": "light", "tan_half_fov": 1}})"))).warnings.size(),
               1u);
 }

@@ -116,9 +116,19 @@ TEST(Camera, NothingToFitTo)
         EXPECT_TRUE(e.path() == "occluders.camera.tan_half_fov") << e.what();
     }
     EXPECT_TRUE(error(DirectionalLight{}, {}).path() == "occluders.camera.half_extent");
-    // A triangle through the light's plane spans any field of view.
-    const Error through = error(rectangle_light(1, 1), {quad({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, "wall")});
-    EXPECT_TRUE(holds(through.message(), "wall")) << through.what();
+}
+
+// A triangle through the light's plane spans any field of view: up to tangents of 8, and a texel's margin of 64 texels.
+TEST(Camera, WhatReachesThroughTheLightsPlaneIsSeenUpToAWideAngle)
+{
+    const Object wall = quad({.5, 0, 0}, {0, 0, 1}, {0, 1, 0}, "wall");
+    const Camera alone = resolve_camera(LightCamera{}, rectangle_light(1, 1), {wall}, 64, 64, "occluders.camera");
+    EXPECT_EQ(alone.half_extent, Vec2(8 * (1 + 2. / 64), 8 * (1 + 2. / 64)));
+
+    // Ground, with all else on the light's side of it, casts on nothing: the view is fitted to the rest.
+    const Object body = quad({0, 0, -5}, {1, 0, 0}, {0, 1, 0}, "body"), ground = quad({0, -2, -5}, {20, 0, 0}, {0, 0, 20}, "ground");
+    const Camera rest = resolve_camera(LightCamera{}, rectangle_light(1, 1), {body, ground}, 64, 64, "occluders.camera");
+    EXPECT_EQ(rest.half_extent, Vec2(.2 * (1 + 2. / 64), .2 * (1 + 2. / 64)));
 }
 
 TEST(Camera, BadFramesAndViewsAreRefused)
