@@ -37,10 +37,13 @@ cp "$pictures/aloeL.jpg" "$pictures/aloeGT.png" "$work"
 depth='"depth": "aloeGT.png",
       "camera": { "kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "up": [0, 1, 0], "vertical_fov_deg": 16.881698 },
       "encoding": { "kind": "disparity", "scale": 0.00167112, "shift": 0.45120321, "empty": 0 }'
+# The light shines towards the plant: what lies behind a light's plane has no shadows.
+center=$(echo "$light" | awk '{ printf "[%s, %s, %s]", $1, $2, $3 }')
+direction=$(echo "$light" | awk '{ printf "[%g, %g, %g]", -$1, -0.1 - $2, -1.5 - $3 }')
 cat > "$work/scene.json" << EOF
 {
   "penumbra": 1,
-  "light": { "kind": "sphere", "center": [$(echo "$light" | sed 's/  */, /g')], "radius": 0.12 },
+  "light": { "kind": "sphere", "center": $center, "direction": $direction, "radius": 0.12 },
   "objects": [ { $depth } ],
   "receivers": { $depth },
   "technique": { "kind": "depth_trace", "samples": $samples }
@@ -49,3 +52,4 @@ EOF
 
 oiiotool "$work/aloeL.jpg" -o "$out/before.png"
 "$penumbra" mask "$work/scene.json" -o "$out/mask.png" --over "$work/aloeL.jpg" --preview "$out/after.png"
+echo "$out: before.png, mask.png, after.png"
