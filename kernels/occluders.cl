@@ -73,8 +73,8 @@ __kernel void nearest_of_block(const int2 size, const int stride, __global const
     nearest[y * blocks.x + x] = d;
 }
 
-// Whether the step from a to b lies on one surface, as in scene/mesh_from_depth.cpp: a plane's disparity is linear across the image, so the
-// slope before or after must be of the same sign and at least half as steep (curvature may double a slope from one texel to the next).
+// Whether the step from a to b lies on one surface: a plane's disparity is linear across the image, so the slope before or after must be of
+// the same sign and at least half as steep (curvature may double a slope from one texel to the next).
 inline bool explains(const float slope, const float step, const float rounding)
 {
     return step * slope > 0.0f && fabs(step) <= 2.0f * fabs(slope) + rounding;

@@ -62,7 +62,7 @@ class Drawing:
 
 def architecture():
     """Rooms and who includes whom: every arrow points down."""
-    d = Drawing(900, 560)
+    d = Drawing(900, 780)
 
     # Doors.
     d.box(60, 20, 220, 62, "clients/cli", ["the command penumbra"], "#e8f0fe")
@@ -81,21 +81,26 @@ def architecture():
     d.box(60, 334, 340, 62, "host/technique", ["one pair of files a technique"])
     d.arrow((230, 286), (230, 333))
 
-    d.box(60, 440, 150, 62, "host/opencl", ["devices, programs"])
-    d.box(235, 440, 165, 62, "host/silhouette", ["edges, loops"])
-    d.box(425, 440, 155, 62, "host/trace", ["Embree: rays"])
+    d.box(60, 440, 150, 62, "host/silhouette", ["edges, loops"])
+    d.box(430, 440, 150, 62, "host/trace", ["Embree: rays"])
+    d.box(260, 540, 320, 62, "host/depth_image", ["depth images as casters and receivers"])
+    d.box(190, 640, 390, 62, "host/opencl", ["devices, programs"])
     d.arrow((135, 396), (135, 439))
-    d.arrow((318, 396), (318, 439))
-    d.arrow((390, 396), (440, 439))
-    d.arrow((500, 286), (500, 439))
+    d.arrow((225, 396), (225, 639))
+    d.arrow((320, 396), (320, 539))
+    d.arrow((390, 396), (460, 439))
+    d.arrow((415, 286), (415, 539))
+    d.arrow((505, 286), (505, 439))
+    d.arrow((505, 502), (505, 539))
+    d.arrow((420, 602), (420, 639))
 
     d.box(650, 334, 190, 62, "host/io", ["images, meshes,", "the scene file"])
     d.arrow((745, 176), (745, 333))
 
-    d.box(60, 524, 780, 30, "host/scene: lights, cameras, depth, meshes; plain data", [], "#e6f4ea")
-    for x in (135, 318, 503):
-        d.arrow((x, 502), (x, 523))
-    d.arrow((745, 396), (745, 523))
+    d.box(60, 730, 780, 30, "host/scene: lights, cameras, depth, meshes; plain data", [], "#e6f4ea")
+    d.arrow((120, 502), (120, 729))
+    d.arrow((385, 702), (385, 729))
+    d.arrow((745, 396), (745, 729))
     d.save("architecture.svg")
 
 
