@@ -59,6 +59,31 @@ int run_on_server(const Flags& flags, const std::vector<MaskFile>& files)
     return 0;
 }
 
+// The other files that are written, of each mask: none may replace another, or what is read.
+void check_further_files(const Flags& flags, const nlohmann::json& json, const std::vector<MaskFile>& masks)
+{
+    std::vector<std::pair<std::string, const char*>> written;
+    for (const auto& [name, flag] : {std::pair(flags.bound, "--bound"), std::pair(flags.preview, "--preview")}) {
+        if (name.empty()) continue;
+        std::vector<std::string> files;
+        for (const MaskFile& file : mask_files(name, json, flags.choice)) files.push_back(file.file);
+        require_not_named_in(flags.scene, json, files, flag);
+        for (const std::string& file : files) written.emplace_back(file, flag);
+    }
+    for (const MaskFile& mask : masks) {
+        if (!flags.over.empty()) require_different(mask.file, "-o", flags.over, "--over");
+        for (const auto& [file, flag] : written) require_different(file, flag, mask.file, "-o");
+    }
+    if (!flags.report.empty() && !flags.over.empty()) require_different(flags.report, "--report", flags.over, "--over");
+    for (std::size_t i = 0; i < written.size(); ++i) {
+        const auto& [file, flag] = written[i];
+        require_different(file, flag, flags.scene, "SCENE.json");
+        if (!flags.over.empty()) require_different(file, flag, flags.over, "--over");
+        if (!flags.report.empty()) require_different(flags.report, "--report", file, flag);
+        for (std::size_t j = i + 1; j < written.size(); ++j) require_different(file, flag, written[j].first, written[j].second);
+    }
+}
+
 // Refuses what the names of files say before anything is read or computed; gives the files to come.
 std::vector<MaskFile> check_files(const Flags& flags)
 {
@@ -74,15 +99,11 @@ std::vector<MaskFile> check_files(const Flags& flags)
                     "expected both: --over PICTURE --preview OUT.png");
     if (!flags.preview.empty()) {
         require_place_for(flags.preview, "--preview");
-        for (const auto& [file, flag] : {std::pair(flags.scene, "SCENE.json"), std::pair(flags.mask, "-o"), std::pair(flags.over, "--over")})
-            require_different(flags.preview, "--preview", file, flag);
         if (format_for(flags.preview, {}, "--preview").format != "png")
             throw Error(ErrorCode::usage, "--preview " + flags.preview + ": is no PNG file", "expected a name that ends in .png");
     }
     if (!flags.bound.empty()) {
         require_place_for(flags.bound, "--bound");
-        require_different(flags.bound, "--bound", flags.scene, "SCENE.json");
-        require_different(flags.bound, "--bound", flags.mask, "-o");
         if (format_for(flags.bound, {}, "--bound").format != "exr")
             throw Error(ErrorCode::usage, "--bound " + flags.bound + ": is no EXR file", "expected a name that ends in .exr: it has two channels, low and high");
     }
@@ -95,6 +116,7 @@ std::vector<MaskFile> check_files(const Flags& flags)
         if (!flags.report.empty()) require_different(flags.report, "--report", file.file, "-o");
     }
     require_not_named_in(flags.scene, json, paths, "-o");
+    check_further_files(flags, json, files);
     return files;
 }
 
@@ -112,7 +134,7 @@ int run(const Flags& flags)
     if (!flags.server.empty() && !flags.preview.empty())
         throw Error(ErrorCode::usage, "--preview " + flags.preview + ": does not go with --server");
     if (!flags.server.empty() && !flags.bound.empty())
-        throw Error(ErrorCode::usage, "--bound " + flags.bound + ": does not go with --server", "POST to /v1/masks?result=bound in its place");
+        throw Error(ErrorCode::usage, "--bound " + flags.bound + ": does not go with --server", "compute it here, without --server");
     if (!flags.server.empty()) return run_on_server(flags, files);
 
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment

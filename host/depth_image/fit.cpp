@@ -261,7 +261,9 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     for (const std::uint8_t one : fit.mixed) fit.quality.between += one;
 
     // Planes.
-    const double sure = std::max(fit.quality.noise, median_of(std::move(quanta)));
+    const double quantum_size = median_of(std::move(quanta));
+    fit.quality.step = quantum_size * std::sqrt(12.);
+    const double sure = std::max(fit.quality.noise, quantum_size);
     const double pixel = fit.orthographic ? fit.pixel_y / std::max(fit.far, 1e-30) : fit.pixel_y;
     fit.quality.reach = reach_for(sure, pixel);
     fit_planes(work, fit, measured);

@@ -16,6 +16,7 @@ namespace penumbra {
 // What was found in an image, for reports and warnings.
 struct DepthQuality {
     double noise = 0;          // standard error of a value over the value: estimated, or stated
+    double step = 0;           // between neighbouring stored numbers, over the value: the median; 0: float32's own
     int reach = 2;             // the planes rest on windows of 2 reach + 1 pixels
     bool antialiased = false;  // pixels between two surfaces hold a mean of both
     bool smeared = false;      // edges are ramps over several pixels

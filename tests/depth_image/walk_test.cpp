@@ -66,7 +66,7 @@ TEST(DepthWalk, LinesThatEndInsideTheImageHaveNotLeftIt)
         const DepthImage image = random_image(c.width, c.height, c.orthographic, c.steep, c.holes, 4);
         WalkRandom random(5);
         int left = 0, checked = 0;
-        for (int i = 0; i < 20000; ++i) {
+        for (int i = 0; i < 300000; ++i) {
             const DepthLine line = random_line(random, image.view);
             const double x = line.x + static_cast<double>(line.to) * line.step_x, y = line.y + static_cast<double>(line.to) * line.step_y;
             // A tenth of a pixel off the border is far beyond rounding.
