@@ -32,7 +32,7 @@ BUNNY = "/usr/share/glmark2/models/bunny.obj"
 QUICK = ("clean", "noise 1e-3", "16-bit window")
 
 
-# Scenes: objects, camera, light.
+# Scenes: objects, camera, light, and the tangent of half the view of the light's map, which holds all that casts.
 
 
 def box(low, high):
@@ -64,7 +64,7 @@ def write_mesh(path, bodies):
 
 
 def ground(center, half_u, half_v):
-    """A floor or a wall. Nothing lies behind it, so it need not be on the light's map, which is finer without it."""
+    """A floor or a wall. Nothing lies behind it, so it does not cast."""
     return {"quad": {"center": center, "half_u": half_u, "half_v": half_v}, "casts": False}
 
 
@@ -83,7 +83,7 @@ def looking(eye, target, degrees):
 def bunny(_):
     foot = min(float(line.split()[2]) for line in open(BUNNY) if line.startswith("v "))
     objects = [{"mesh": BUNNY, "translate": [0, -foot, 0]}, ground([0, 0, 0], [24, 0, 0], [0, 0, -24])]
-    return objects, looking([-0.6, 3.4, 4.6], [0.3, 0.6, 0], 30), lamp([-3, 4.5, 2.5], [0, 0.6, 0], 0.4)
+    return objects, looking([-0.6, 3.4, 4.6], [0.3, 0.6, 0], 30), lamp([-3, 4.5, 2.5], [0, 0.6, 0], 0.4), 0.3
 
 
 def room(folder):
@@ -91,7 +91,7 @@ def room(folder):
     write_mesh(folder / "table.obj", [box((-1, 0.95, -0.6), (1, 1.05, 0.6)), ball((0.35, 1.4, 0), 0.35)] + legs)
     objects = [{"mesh": "table.obj"}, ground([0, 0, 0], [6, 0, 0], [0, 0, -6]),
                ground([0, 3, -2], [6, 0, 0], [0, 3, 0]), ground([-2.4, 3, 0], [0, 0, -6], [0, 3, 0])]
-    return objects, looking([2.6, 2.7, 4.6], [-0.3, 0.8, -0.3], 40), lamp([1.8, 4, 2.6], [0, 0.8, -0.2], 0.35)
+    return objects, looking([2.6, 2.7, 4.6], [-0.3, 0.8, -0.3], 40), lamp([1.8, 4, 2.6], [0, 0.8, -0.2], 0.35), 0.45
 
 
 SCENES = {"bunny": bunny, "room": room}
@@ -208,8 +208,9 @@ def prepared(name, program, out):
     folder = out / name
     folder.mkdir(parents=True, exist_ok=True)
     study = Study(program, folder)
-    objects, camera, light = SCENES[name](folder)
-    scene = {"penumbra": 1, "light": light, "objects": objects, "occluders": {"resolution": [512, 512]},
+    objects, camera, light, tangent = SCENES[name](folder)
+    scene = {"penumbra": 1, "light": light, "objects": objects,
+             "occluders": {"camera": {"kind": "light", "tan_half_fov": tangent}, "resolution": [512, 512]},
              "receivers": {"camera": camera, "resolution": [WIDTH, HEIGHT]}}
     finer = dict(scene, receivers={"camera": camera, "resolution": [FINE * WIDTH, FINE * HEIGHT]})
     study.must("mask", "truth", scene, "-o", "truth.exr", "--technique", "ray_traced", "--set", "samples=1024")
@@ -229,7 +230,8 @@ def view_of(study, camera, name, pixels, kind, encoding):
 
 
 def relit(scene, view):
-    return dict(scene, objects=[view], receivers=view)
+    """Maps of a depth image are fitted to it."""
+    return dict(scene, objects=[view], receivers=view, occluders={"resolution": [512, 512]})
 
 
 def measure(name, given):
