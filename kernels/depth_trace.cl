@@ -92,7 +92,7 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
     float3 centre = of3(light.centre), half_u = of3(light.half_u), half_v = of3(light.half_v);
     if (!light.endless) centre -= point;
     if (light.sphere && dot(half_u, half_u) > 0.0f) face_receiver(centre, &half_u, &half_v);
-    const ulong key = sample_key(light, (ulong)i);
+    const ulong key = sample_key(light, (ulong)(i + light.key_first));
     const DepthVector start = {point.x, point.y, point.z};
     uint outside = 0;
 
@@ -114,8 +114,9 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
             const DepthLine line = depth_line(view, start, direction, light.endless, light.own);
             const DepthMet met = depth_walk(view, pixels, nearest, DEPTH_LEVELS, line, bounds, 0);
             bits |= met.blocked ? bit : 0;
-            sure |= met.crossed ? bit : 0;
-            maybe |= met.behind ? bit : 0;
+            // What is blocked for certain is blocked: a crossing that the surface's own back hides is not counted.
+            sure |= met.crossed && met.blocked ? bit : 0;
+            maybe |= met.behind || met.crossed ? bit : 0;
             outside += !met.crossed && met.left;
         }
         blocked[word] = bits;

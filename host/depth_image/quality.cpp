@@ -24,7 +24,7 @@ std::string quality_note(const DepthQuality& quality, const std::string& where)
     std::string note = where + print(": noise %.1e of the depth, planes over %d x %d pixels", quality.noise, side, side);
     if (quality.step > 0) note += print(", stored in steps of %.1e of it", quality.step);
     note += print(", %.0f %% of the edges between two surfaces", 100 * quality.edge_share);
-    if (quality.filled > 0) note += print(", %llu pixels of holes closed", static_cast<unsigned long long>(quality.filled));
+    if (quality.filled > 0 && !quality.smeared) note += print(", %llu pixels of holes closed", static_cast<unsigned long long>(quality.filled));
     return note;
 }
 

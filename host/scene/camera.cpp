@@ -120,7 +120,7 @@ LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, 
     LightBox result;
     for (const Object& object : objects) {
         if (!object.casts && !object.receives) continue;
-        if (without_ground && is_ground(object, light, objects)) continue;
+        if (without_ground && (!object.casts || is_ground(object, light, objects))) continue;
         if (object.seen) add_seen(result, light, *object.seen);
         add_mesh(result, light, object);
     }

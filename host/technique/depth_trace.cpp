@@ -69,7 +69,7 @@ struct Followed {
     std::size_t count = 0;
 };
 Followed follow(opencl::Work& work, const PreparedDepthTrace& prepared, const Receiving& receivers, std::span<const DepthVector> points,
-                std::span<const DepthVector> normals)
+                std::span<const DepthVector> normals, std::size_t key_first)
 {
     const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
     const std::vector<cl_uint> none(words * points.size(), 0);
@@ -85,6 +85,7 @@ Followed follow(opencl::Work& work, const PreparedDepthTrace& prepared, const Re
     for (const DeviceDepthImage& image : *prepared.images) {
         DepthLight light = light_for(prepared, image.camera, receivers.camera, !normals.empty());
         light.count = static_cast<int>(points.size());
+        light.key_first = static_cast<int>(key_first);
         work.launch(depth_trace_program(work.context().quirks().lanes), "depth_trace", {points.size(), 1}, {64, 1}, points.size() * 24, image.view,
                     light, cl_int{1}, image.pixels, image.nearest, followed.points, on_normals, prepared.strata, prepared.step, followed.blocked,
                     followed.crossed, followed.unknown, followed.left);
@@ -103,7 +104,7 @@ Image bound_of(opencl::Work& work, const PreparedDepthTrace& prepared, const Rec
         const std::size_t count = std::min(band, points.size() - first);
         const auto some = std::span<const DepthVector>(points).subspan(first, count);
         const auto normals = receivers.surface ? std::span<const DepthVector>(receivers.surface->normals).subspan(first, count) : std::span<const DepthVector>{};
-        const Followed followed = follow(work, prepared, receivers, some, normals);
+        const Followed followed = follow(work, prepared, receivers, some, normals, first);
         const auto room = [&] { return work.buffer<float>(count, "bounds"); };
         const auto visibility = room(), low = room(), high = room();
         work.launch(depth_trace_program(work.context().quirks().lanes), "depth_count", {count, 1}, {64, 1}, count * (words * 12 + 16), cl_int{0},
@@ -132,7 +133,7 @@ void follow_some(opencl::Work& work, const PreparedDepthTrace& prepared, const R
             if (receivers.surface) normals.push_back(receivers.surface->normals[i]);
         }
     if (some.empty()) return;
-    const Followed followed = follow(work, prepared, receivers, some, normals);
+    const Followed followed = follow(work, prepared, receivers, some, normals, 0);
     const std::vector<cl_uint> crossed = work.read(followed.crossed), unknown = work.read(followed.unknown), left = work.read(followed.left);
     counts.followed = some.size() * static_cast<std::uint64_t>(prepared.samples);
     for (std::size_t i = 0; i < crossed.size(); ++i) counts.behind += static_cast<std::uint64_t>(std::popcount(unknown[i] & ~crossed[i]));

@@ -263,8 +263,8 @@ private:
                 const DepthMet met = depth_walk(image.view, image.pixels.data(), image.nearest.data(), DEPTH_LEVELS, line, followed != nullptr, 0);
                 if (met.blocked) tfar[i] = -std::numeric_limits<float>::infinity();
                 if (!followed) continue;
-                followed->crossed[i] |= met.crossed != 0;
-                followed->behind[i] |= met.behind != 0;
+                followed->crossed[i] |= met.crossed != 0 && met.blocked != 0;
+                followed->behind[i] |= met.behind != 0 || met.crossed != 0;
                 followed->left[i] |= met.left != 0;
             }
         }

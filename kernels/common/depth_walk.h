@@ -79,6 +79,7 @@ typedef struct {
     int disc, sphere;              // square samples become a disc's; one that faces the receiver
     int samples;
     int first, count;              // of the receivers that this launch is for, and how many
+    int key_first;                 // added to a receiver's number for its samples
     int has_normals;
     float own;                     // hits nearer to the receiver than so many pixels do not count
     int seed_low, seed_high;       // of the samples

@@ -112,6 +112,15 @@ std::string text_of(const std::string& path)
     return text.str();
 }
 
+void expect_alike(const std::string& path, const std::string& other)
+{
+    const Image a = read_image(path), b = read_image(other);
+    ASSERT_EQ(a.pixels.size(), b.pixels.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]));
+    EXPECT_LE(sum / static_cast<double>(a.pixels.size()), .01) << path << " and " << other;
+}
+
 void expect_same_bytes(const std::string& path, const std::string& other)
 {
     const bool same = text_of(path) == text_of(other);

@@ -46,7 +46,7 @@ TEST(Table, HasTheTechniquesOfThePublicHeader)
         structs.insert(row.defaults.index());
     }
     EXPECT_EQ(kinds, (std::set<std::string_view>{"shadow_map", "soft_shadow_map", "soft_shadow_volume", "occlusion_texture", "smoothie",
-                                                 "ray_traced"}));
+                                                 "ray_traced", "depth_trace"}));
     EXPECT_EQ(structs.size(), std::variant_size_v<Technique>);
 }
 
