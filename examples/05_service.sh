@@ -1,7 +1,7 @@
 #!/bin/sh
 # 05: the scene of 01 from a service: by curl, by the command line, and from Python (05_service.py).
 #
-# Expected: mean visibility 0.7500
+# Expected: mean visibility 0.7503
 #
 # The programs are $PENUMBRA and $PENUMBRA_SERVER, or else `penumbra` and `penumbra-server` on the path; the Python package is in
 # $PENUMBRA_PYTHONPATH, or else in clients/python.

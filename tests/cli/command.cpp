@@ -1,3 +1,5 @@
+#include <penumbra/image.hpp>
+
 #include "command.hpp"
 
 #include <algorithm>
@@ -114,7 +116,7 @@ std::string text_of(const std::string& path)
 
 void expect_alike(const std::string& path, const std::string& other)
 {
-    const Image a = read_image(path), b = read_image(other);
+    const penumbra::Image a = penumbra::read_image(path), b = penumbra::read_image(other);
     ASSERT_EQ(a.pixels.size(), b.pixels.size());
     double sum = 0;
     for (std::size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]));
