@@ -29,7 +29,7 @@ struct Geometry::State {
 
     // Depth images among the objects that cast, or that receive, fitted on the device of `context` (null: a device of the environment's
     // choice). Each is fitted once.
-    std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
+    [[gnu::visibility("hidden")]] std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
     std::vector<std::pair<std::size_t, DepthQuality>> qualities(bool Object::*role) const; // by object, of those fitted so far
     // The receivers on an object's depth image, where that is the same image: they need no fit of their own. Null: there is none.
     std::shared_ptr<const DepthSurface> surface_of_same(const DepthMap& depth, const Camera& camera) const;
