@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -63,14 +65,66 @@ bool is_ground(const Object& object, const LightFrame& light, const std::vector<
     return true;
 }
 
-// What of an image's pixels is fitted to: all but the outermost half a per cent each way, where stray pixels lie.
-constexpr double fitted_share = .995;
+struct Weighted {
+    double tangent, weight;
+};
+
+// What a view is fitted to, of the tangents of an image's pixels: all but the outermost half a per cent by weight, where stray pixels lie.
+double most_of(std::vector<Weighted>& tangents)
+{
+    std::sort(tangents.begin(), tangents.end(), [](const Weighted& a, const Weighted& b) { return a.tangent < b.tangent; });
+    double left = 0;
+    for (const Weighted& one : tangents) left += one.weight;
+    left *= .995;
+    for (const Weighted& one : tangents)
+        if ((left -= one.weight) <= 0) return one.tangent;
+    return tangents.back().tangent;
+}
+
+// From this tangent on (63 degrees) a fitted view is kept to what casts: surfaces that run into the light's plane would take all its texels.
+constexpr double wide_view = 2;
+
+// The tangents that hold what casts on seen points, from the points alone: a shadow map of coarse bins of equal angles, in which a point lies in
+// shadow when it is further than all that the nine bins around it show first. Points weigh what the light would send them: the cosine at the light
+// over the square of the distance, so that a background far away or beside the light counts for little. Widened by the penumbra. 0: nothing casts.
+Vec2 casting_tangents(const std::vector<Vec3>& points, const LightFrame& light)
+{
+    constexpr int bins = 128;
+    constexpr double behind = 1.02;
+    const auto bin_of = [](double tangent) {
+        return std::clamp(static_cast<int>((std::atan(tangent) / std::numbers::pi + .5) * bins), 0, bins - 1);
+    };
+    const auto at = [](int x, int y) { return static_cast<std::size_t>(y) * bins + static_cast<std::size_t>(x); };
+    std::vector<double> first(std::size_t{bins} * bins, 0); // 0: empty
+    for (const Vec3& p : points) {
+        double& z = first[at(bin_of(p.x / p.z), bin_of(p.y / p.z))];
+        z = z == 0 ? p.z : std::min(z, p.z);
+    }
+    std::vector<Weighted> tangents_x, tangents_y;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Vec3& p : points) {
+        const int x = bin_of(p.x / p.z), y = bin_of(p.y / p.z);
+        double furthest = 0;
+        for (int j = std::max(y - 1, 0); j <= std::min(y + 1, bins - 1); ++j)
+            for (int i = std::max(x - 1, 0); i <= std::min(x + 1, bins - 1); ++i) furthest = std::max(furthest, first[at(i, j)]);
+        if (!(p.z > behind * furthest)) continue;
+        nearest = std::min(nearest, first[at(x, y)]);
+        const double distance = p.length(), weight = p.z / (distance * distance * distance);
+        tangents_x.push_back({std::abs(p.x / p.z), weight});
+        tangents_y.push_back({std::abs(p.y / p.z), weight});
+    }
+    if (tangents_x.empty()) return {0, 0};
+    const double bin = std::numbers::pi / bins;
+    const auto widened = [&](double t, double half) { return std::tan(std::min(std::atan(t) + 2 * bin, 1.4)) + half / nearest; };
+    return {widened(most_of(tangents_x), light.half_u), widened(most_of(tangents_y), light.half_v)};
+}
 
 // The same of a depth image's pixels. What lies behind the light's plane or all but in it is left out: what is not on the map casts no shadow,
 // and shading counts who sees past its border.
 void add_seen(LightBox& result, const LightFrame& light, const SeenSurface& seen)
 {
-    std::vector<double> x, y;
+    std::vector<Weighted> x, y;
+    std::vector<Vec3> points;
     for (int row = 0; row < seen.depth.height; ++row)
         for (int column = 0; column < seen.depth.width; ++column) {
             const double depth = seen.depth.at(column, row);
@@ -78,16 +132,18 @@ void add_seen(LightBox& result, const LightFrame& light, const SeenSurface& seen
             const Vec3 p = light_from_world(light, world_point(seen.camera, seen.depth.width, seen.depth.height, column + .5, row + .5, depth));
             result.box.extendBy(p);
             if (!(p.z > 0)) continue;
-            x.push_back(std::abs(p.x / p.z));
-            y.push_back(std::abs(p.y / p.z));
+            x.push_back({std::abs(p.x / p.z), 1});
+            y.push_back({std::abs(p.y / p.z), 1});
+            points.push_back(p);
         }
     if (x.empty()) return;
-    const auto quantile = [](std::vector<double>& v) {
-        const auto at = v.begin() + static_cast<std::ptrdiff_t>(fitted_share * static_cast<double>(v.size() - 1));
-        std::nth_element(v.begin(), at, v.end());
-        return *at;
-    };
-    result.tangent = {std::max(result.tangent.x, quantile(x)), std::max(result.tangent.y, quantile(y))};
+    Vec2 tangent(most_of(x), most_of(y));
+    if (std::max(tangent.x, tangent.y) > wide_view) {
+        const Vec2 casting = casting_tangents(points, light);
+        const Vec2 most = casting.x > 0 || casting.y > 0 ? casting : Vec2(wide_view, wide_view);
+        tangent = {std::min(tangent.x, most.x), std::min(tangent.y, most.y)};
+    }
+    result.tangent = {std::max(result.tangent.x, tangent.x), std::max(result.tangent.y, tangent.y)};
 }
 
 // What reaches through the light's plane spans any field of view: its tangents count up to this.
