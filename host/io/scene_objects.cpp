@@ -100,7 +100,7 @@ void place(TriangleMesh& mesh, const JsonObject& section)
     }
 }
 
-// The camera moves with its surfaces; its depth and their thickness grow with the scale.
+// The camera moves with its surfaces and its depth grows with the scale; `thickness` is a length in the scene already.
 void place(SeenSurface& seen, const JsonObject& section)
 {
     const Placement placement = placement_of(section);
