@@ -94,6 +94,8 @@ std::uint64_t Geometry::State::bytes() const
     const std::lock_guard fitting(fitting_);
     for (const auto& image : images_)
         if (image) total += image->bytes();
+    for (const auto& surface : surfaces_)
+        if (surface) total += surface->points.size() * (2 * sizeof(DepthVector) + sizeof(float));
     return total;
 }
 

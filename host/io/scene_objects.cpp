@@ -109,7 +109,11 @@ void place(SeenSurface& seen, const JsonObject& section)
     if (placement.scale == 1) return;
     const auto scale = static_cast<float>(placement.scale);
     // As the corners of a mesh do, depths end in one point when they are too small for float32.
-    for (float& depth : seen.depth.depth) depth = std::max(depth * scale, std::numeric_limits<float>::min());
+    for (float& depth : seen.depth.depth) {
+        if (std::isfinite(depth) && !std::isfinite(depth * scale))
+            throw section.value().error("has depths beyond float32", "scale is too large");
+        depth = std::max(depth * scale, std::numeric_limits<float>::min());
+    }
     if (seen.camera.orthographic) seen.camera.half_extent *= placement.scale;
     seen.depth.step.depth *= placement.scale;
     seen.depth.step.disparity /= placement.scale;

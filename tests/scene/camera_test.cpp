@@ -131,6 +131,32 @@ TEST(Camera, WhatReachesThroughTheLightsPlaneIsSeenUpToAWideAngle)
     EXPECT_EQ(rest.half_extent, Vec2(.2 * (1 + 2. / 64), .2 * (1 + 2. / 64)));
 }
 
+// A depth image that shows a plate, a lower half that is near and a wall far behind. Where that runs into the light's plane, its tangents would have
+// no end; the view stays within what casts: tan(1.4) and the penumbra's width.
+TEST(Camera, ADepthImagesViewHoldsWhatCasts)
+{
+    constexpr int size = 200;
+    SeenSurface seen{.depth = {.width = size, .height = size, .depth = {}, .from_image = true},
+                     .camera = {.frame = {}, .orthographic = false, .half_extent = {1, 1}}};
+    for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) {
+            const bool plate = std::abs(x - size / 2) < size / 8 && std::abs(y - size / 2) < size / 8;
+            seen.depth.depth.push_back(plate ? 4.f : y > size / 2 ? 8.f : 400.f);
+        }
+    seen.camera.frame.origin = {.5, 0, 0}; // beside the light, so that some of what the plate shades is seen
+    RectangleLight light = rectangle_light(.1, .1);
+    const Object object{.name = "depth", .mesh = {}, .seen = seen};
+    const Camera narrow = resolve_camera(LightCamera{}, light, {object}, 64, 64, "occluders.camera");
+    EXPECT_LE(narrow.half_extent.x, 1.3) << "nothing here runs into the light's plane: all of it is held";
+
+    // Turned by 80 degrees, the light has a part of the wall behind its plane, and another at tangents without end.
+    const double a = 80 * 3.14159265358979 / 180;
+    light.center = {3, 0, -6};
+    light.half_u = {.1 * std::cos(a), 0, .1 * std::sin(a)};
+    const Camera turned = resolve_camera(LightCamera{}, light, {object}, 64, 64, "occluders.camera");
+    EXPECT_LE(std::max(turned.half_extent.x, turned.half_extent.y), 6) << "tan(1.4) and a penumbra's width at the most";
+}
+
 TEST(Camera, BadFramesAndViewsAreRefused)
 {
     const auto refused = [](const Frame& frame, const Vec2& half) {
