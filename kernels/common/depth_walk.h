@@ -104,6 +104,18 @@ DEPTH_FUNCTION float depth_value(const DepthView view, const float z)
     return view.orthographic ? view.far - z : 1.0f / z;
 }
 
+// The part of from to to in which start + t step lies between 0 and size; none: to < from.
+DEPTH_FUNCTION void depth_clip(const float start, const float step, const float size, float* from, float* to)
+{
+    if (step == 0.0f) {
+        if (start < 0.0f || start >= size) *to = -1.0f;
+        return;
+    }
+    const float a = -start / step, b = (size - start) / step;
+    *from = fmax(*from, fmin(a, b));
+    *to = fmin(*to, fmax(a, b));
+}
+
 // The line from `point` along `direction` (unlike a unit vector: its end is point + direction), or without end when `endless`. own: see DepthLine.
 // Not there (to < from) when no part of it can meet anything.
 DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, DepthVector direction, const int endless, const float own)
@@ -168,20 +180,8 @@ DEPTH_FUNCTION DepthLine depth_line(const DepthView view, DepthVector point, Dep
     if (line.step_value < 0.0f) line.from = fmax(line.from, (view.nearest - line.value) / line.step_value);
     if (line.step_value == 0.0f && line.value > view.nearest) line.to = -1.0f;
     const float begin = line.from, end = line.to;
-    if (line.step_x != 0.0f) {
-        const float a = -line.x / line.step_x, b = ((float)view.width - line.x) / line.step_x;
-        line.from = fmax(line.from, fmin(a, b));
-        line.to = fmin(line.to, fmax(a, b));
-    } else if (line.x < 0.0f || line.x >= (float)view.width) {
-        line.to = -1.0f;
-    }
-    if (line.step_y != 0.0f) {
-        const float a = -line.y / line.step_y, b = ((float)view.height - line.y) / line.step_y;
-        line.from = fmax(line.from, fmin(a, b));
-        line.to = fmin(line.to, fmax(a, b));
-    } else if (line.y < 0.0f || line.y >= (float)view.height) {
-        line.to = -1.0f;
-    }
+    depth_clip(line.x, line.step_x, (float)view.width, &line.from, &line.to);
+    depth_clip(line.y, line.step_y, (float)view.height, &line.from, &line.to);
     line.leaves = begin < end && (line.from > begin || line.to < end);
     return line;
 }
