@@ -14,6 +14,7 @@
 #include "receivers.cl"
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"
+#include "common/own_surface.clh"
 
 // From which disparity on an occluder counts for a receiver: d + bias.
 //
@@ -23,28 +24,24 @@
 //     D (1 - sx / (2 kx hx) - sy / (2 ky hy)) <= (sx + sy) / 2.
 // No texel of the plane counts, then, if the limit is that far above. Where the bracket is not positive the light's own plane is edge-on to
 // the surface and no bound exists; it is held at 1/4 (a bias of two texel steps).
-// A receiver is on the surface when its own texel's disparity differs by no more than one step each way can explain.
-// Elsewhere only rounding counts: both disparities are right to a few units in the last place and to the depth's own `precision`.
+// Which texels are of the receiver's surface: common/own_surface.clh. Elsewhere only rounding counts.
 inline floatn limits_of(const OccluderView occluders, const float bias, const float precision, __global const float2* texels,
                         __global const float2* steps, const floatn xi, const floatn eta, const floatn d)
 {
-    float column[LANES], row[LANES], surface[LANES], step_x[LANES], step_y[LANES];
+    float column[LANES], row[LANES], disparity[LANES], step_x[LANES], step_y[LANES];
     store_lanes((xi + 1.0f) * (0.5f * occluders.width), column);
     store_lanes((1.0f - eta) * (0.5f * occluders.height), row);
+    store_lanes(d, disparity);
     for (int lane = 0; lane < LANES; ++lane) {
-        const bool inside = column[lane] >= 0.0f && row[lane] >= 0.0f && column[lane] < (float)occluders.width && row[lane] < (float)occluders.height;
-        const int texel = inside ? (int)row[lane] * occluders.width + (int)column[lane] : 0;
-        surface[lane] = inside ? texels[texel].x : 0.0f;
-        step_x[lane] = steps[texel].x;
-        step_y[lane] = steps[texel].y;
+        const float2 own = own_steps((int2)(occluders.width, occluders.height), texels, steps, (float2)(column[lane], row[lane]), disparity[lane], precision);
+        step_x[lane] = own.x;
+        step_y[lane] = own.y;
     }
 
-    const floatn own = load_lanes(surface), sx = load_lanes(step_x), sy = load_lanes(step_y);
-    const floatn rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d;
+    const floatn sx = load_lanes(step_x), sy = load_lanes(step_y);
     const floatn bracket = 1.0f - (sx * occluders.edge_on_x + sy * occluders.edge_on_y);
     const floatn slope = bias * 0.5f * (sx + sy) / select_lanes((floatn)(0.25f), bracket, bracket > 0.25f);
-    const floatn far = select_lanes((floatn)(0.0f), slope, fabs(own - d) <= sx + sy + rounding);
-    return d + rounding + select_lanes((floatn)(0.0f), far, own > 0.0f);
+    return d + (8.0f * 0x1p-24f + 2.0f * precision) * d + slope;
 }
 
 // Adds u v to a sum. With binary32 the product is not rounded on its own.

@@ -32,10 +32,28 @@ double place_tolerance(const LightFrame& light, const Vec3& origin)
 
 } // namespace
 
-Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height)
+LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, const Needs& needs, const Receivers* receivers)
+{
+    LeftOut result;
+    if (needs.whole_view) return result;
+    for (const Object& object : objects) result.objects.push_back(!object.casts);
+    if (!receivers) return result;
+    std::vector<Ground> grounds = grounds_of(light_frame(light), objects);
+    // Receivers that are rendered from the objects lie before ground, as those do.
+    if (receivers->depth && !grounds.empty()) {
+        const Camera camera = resolve_camera(receivers->camera, light, objects, receivers->width, receivers->height, "receivers.camera");
+        if (shows_behind(grounds, *receivers->depth, camera)) return result;
+    }
+    for (const Ground& ground : grounds) result.objects[ground.object] = true;
+    result.grounds = std::move(grounds);
+    return result;
+}
+
+Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height,
+                       const LeftOut& left_out)
 {
     const LightFrame frame = light_frame(light);
-    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera");
+    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera", left_out.objects);
     if (std::holds_alternative<LightCamera>(spec)) return camera;
 
     // A pinhole will do if it is the light's own view: same place, same axes to within a ten-thousandth.
@@ -104,7 +122,7 @@ Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camer
     return views;
 }
 
-Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs,
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
                                const std::shared_ptr<const opencl::Context>& context)
 {
     Occluders occluders = given;
@@ -115,7 +133,7 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     const bool render_front = needs.front && !occluders.front, render_back = needs.back && !occluders.back;
     if (render_front && !casters) missing("occluders.depth.front", "cast");
     if (render_back && !casters) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
-    const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height);
+    const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height, left_out);
     if (render_front || render_back) {
         Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, context, !needs.depth_images);
         if (render_front) occluders.front = std::move(views.front);
@@ -163,9 +181,14 @@ Scene with_depth(const Scene& scene, const Technique& technique)
 {
     validate_lights(scene);
     const Geometry geometry = view_of(scene);
+    const Needs needs = needs_of(technique);
+    const auto complete = [&](const Light& light, const Occluders& given) {
+        const LeftOut left_out = left_out_of(light, scene.objects, needs, &scene.receivers);
+        return occluders_with_depth(light, given, geometry, needs, left_out, nullptr);
+    };
     Scene result = scene;
     if (scene.lights.empty()) {
-        result.occluders = occluders_with_depth(scene.light, scene.occluders, geometry, needs_of(technique), nullptr);
+        result.occluders = complete(scene.light, scene.occluders);
         result.receivers = with_depth(scene.receivers, scene.light, geometry);
         return result;
     }
@@ -173,7 +196,7 @@ Scene with_depth(const Scene& scene, const Technique& technique)
         SceneLight& light = result.lights[i];
         const bool own = light.occluders.has_value();
         try {
-            light.occluders = occluders_with_depth(light.light, own ? *light.occluders : scene.occluders, geometry, needs_of(technique), nullptr);
+            light.occluders = complete(light.light, own ? *light.occluders : scene.occluders);
         } catch (const Error& error) {
             throw in_list(error, i, own);
         }

@@ -4,16 +4,28 @@
 #include <penumbra/engine.hpp>
 
 #include "scene/camera.hpp"
+#include "scene/ground.hpp"
 #include "technique/verbs.hpp"
 
 namespace penumbra {
 
+// What the light's view of what casts need not hold: objects that do not cast, and ground.
+struct LeftOut {
+    std::vector<bool> objects; // one an object; empty: none
+    std::vector<Ground> grounds;
+};
+
+// For these receivers; null: they are not known, and ground stays, as something behind it may be shaded later. Nothing where the technique needs the
+// whole view.
+LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, const Needs& needs, const Receivers* receivers);
+
 // The light's own view at the occluder map's size. Throws invalid_input when the scene says another camera than the light's.
-Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height);
+Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::vector<Object>& objects, int width, int height,
+                       const LeftOut& left_out = {});
 
 // The occluders with what `needs` names in place and their camera explicit. Throws invalid_input naming what is missing when there are no
 // objects to render it from, and for maps whose sizes do not fit. The same for receivers: with_depth (engine.hpp).
-Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs,
+Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
                                const std::shared_ptr<const opencl::Context>& context);
 
 // with_depth (engine.hpp) on a device that is open: depth images are fitted there. Null: one of the environment's choice.

@@ -87,14 +87,25 @@ private:
         const MaskLight& light = job_.lights[index];
         // A light without a sequence of its own is the same in all frames.
         const int own_frame = frames_of(light.light) > 0 ? frame : 0;
-        if (auto kept = keeper_.prepared(index, own_frame)) return {std::move(*kept), true};
+        if (auto kept = keeper_.prepared(index, own_frame); kept && serves(*kept, light.light)) return {std::move(*kept), true};
         before("preparing");
         const Light now = at_frame(light.light, own_frame);
-        const auto still = keeper_.prepared_in_any_frame(index);
+        auto still = keeper_.prepared_in_any_frame(index);
+        if (still && !serves(*still, light.light)) still.reset();
         Prepared made = still ? engine_.with_emission(*still, *std::get<RectangleLight>(now).emission)
-                              : engine_.prepare(now, *light.occluders, job_.geometry, job_.technique);
+                              : engine_.prepare(now, *light.occluders, job_.geometry, job_.technique, job_.receivers.get());
         keeper_.keep(index, own_frame, made);
         return {std::move(made), false};
+    }
+
+    // Whether the occluder map holds what casts on these receivers: nothing of theirs lies behind ground that it was not fitted to.
+    bool serves(const Prepared& prepared, const Light& light) const
+    {
+        const std::vector<Ground>& grounds = prepared.state().grounds;
+        const Receivers& given = *job_.receivers;
+        if (grounds.empty() || !given.depth) return true;
+        const Camera camera = resolve_camera(given.camera, light, job_.geometry.objects(), given.width, given.height, "receivers.camera");
+        return !shows_behind(grounds, *given.depth, camera);
     }
 
     // The receivers with their depth; the first light renders it where it is missing.

@@ -53,11 +53,12 @@ bool inside_view(const Imath::Box3d& box, const Camera& view)
     return true;
 }
 
-// Whether every triangle before the light's plane lies inside the light's view.
-bool casters_inside(const std::vector<Object>& objects, const Camera& view)
+// Whether every triangle before the light's plane lies inside the light's view, of objects that are not left out.
+bool casters_inside(const std::vector<Object>& objects, const Camera& view, const LeftOut& left_out)
 {
-    for (const Object& object : objects) {
-        if (!object.casts) continue;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const Object& object = objects[i];
+        if (!object.casts || (!left_out.objects.empty() && left_out.objects[i])) continue;
         if (object.seen) return false; // its pixels are many, and counting receivers costs nothing
         if (inside_view(bounds(object.mesh), view)) continue;
         for (const auto& triangle : object.mesh.triangles) {
@@ -87,7 +88,8 @@ void check_casters(const Needs& needs, bool casters, const Occluders& given, con
 }
 
 // The maps that prepare is handed: those that it needs, or all that there are where they stand for the objects.
-LightDepth depth_of(const Light& light, const Occluders& occluders, const std::vector<Object>& objects, const Needs& needs, bool all)
+LightDepth depth_of(const Light& light, const Occluders& occluders, const std::vector<Object>& objects, const Needs& needs, const LeftOut& left_out,
+                    bool all)
 {
     const auto taken = [&](const std::optional<DepthMap>& map, bool wanted, const char* where) -> const DepthMap* {
         if (!map || !wanted) return nullptr;
@@ -105,7 +107,7 @@ LightDepth depth_of(const Light& light, const Occluders& occluders, const std::v
     if (all) depth.layers = occluders.layers;
     for (std::size_t i = 0; i < depth.layers.size(); ++i)
         check_size(depth.layers[i], depth.width, depth.height, "occluders.depth.layers[" + std::to_string(i) + "]");
-    depth.camera = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height);
+    depth.camera = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height, left_out);
     return depth;
 }
 
@@ -214,10 +216,11 @@ Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
     if (!scene.lights.empty())
         throw Error::at(ErrorCode::usage, "lights", "are " + std::to_string(scene.lights.size()) + ", and one can be prepared",
                         "masks computes them all, only_light takes one");
-    return prepare(scene.light, scene.occluders, view_of(scene), technique);
+    return prepare(scene.light, scene.occluders, view_of(scene), technique, &scene.receivers);
 }
 
-Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique) const
+Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique,
+                         const Receivers* receivers) const
 {
     auto state = new_state(impl_->context, light, technique);
     Needs needs = needs_of(technique);
@@ -230,6 +233,8 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     // Of a technique that traces images alone, meshes are what the light sees of them.
     if (needs.depth_images && or_front) needs.front = objects.any_mesh(&Object::casts);
     const bool maps = needs.front || needs.back;
+    const LeftOut left_out = maps ? left_out_of(light, geometry.objects(), needs, receivers) : LeftOut{};
+    state->grounds = left_out.grounds;
     Casting casting{.light = state->light,
                     .depth = {},
                     .meshes = by_view ? std::vector<const TriangleMesh*>{} : casting_meshes(geometry),
@@ -246,15 +251,15 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     Occluders complete;
     if (maps) {
         const Stopwatch watch;
-        complete = occluders_with_depth(light, given, geometry, needs, state->context);
+        complete = occluders_with_depth(light, given, geometry, needs, left_out, state->context);
         state->stages.push_back({"render depth", watch.ms(), 0, 0});
     }
     const bool shown = casting.meshes.empty() && or_front && (by_view || casting.images.empty());
-    if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, shown);
+    if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, left_out, shown);
 
     prepare_technique(*state, casting);
     say_quality(*state, geometry);
-    state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view));
+    state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view, left_out));
     if (needs.receivers_from_light && objects.any(&Object::receives)) state->receiver_geometry = geometry;
     return Prepared(state);
 }
@@ -270,6 +275,7 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     state->light_view = before.light_view;
     state->channels = emission.channels;
     state->covered = before.covered;
+    state->grounds = before.grounds;
     state->warnings = before.warnings;
     opencl::Work work(state->context);
     state->data = under_other_emission(work, before.data, state->light);

@@ -141,6 +141,9 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     opencl::Buffer<float> visibility;
     if (!row_of(mask.report.technique).on_host)
         visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");
+    if (shows_behind(state.grounds, *receivers.depth, camera))
+        mask.report.warnings.emplace_back("receivers lie behind ground that the occluder map was not fitted to: prepared for other receivers, it may miss "
+                                          "what casts on these");
     ShadeCounts counts;
     Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .bound = bound ? &mask.bound : nullptr};
     shade_technique(work, state, receiving, shaded);

@@ -10,6 +10,7 @@
 #include <penumbra/engine.hpp>
 
 #include "opencl/work.hpp"
+#include "scene/ground.hpp"
 #include "technique/techniques.hpp"
 
 namespace penumbra {
@@ -30,6 +31,7 @@ struct Prepared::State {
     Camera light_view;                             // that receivers come in; unused by rays
     int channels = 1;                              // of the visibility
     bool covered = false;                          // every caster is known to lie inside the occluder map
+    std::vector<Ground> grounds;                   // that the occluder map was not fitted to, as nothing receives behind them
     std::optional<Geometry> receiver_geometry;     // with objects that receive, where the technique wants the light's view of them
     PreparedTechnique data;
 

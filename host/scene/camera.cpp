@@ -4,10 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <string>
 
 #include <penumbra/error.hpp>
+
+#include "scene/ground.hpp"
 
 namespace penumbra {
 namespace {
@@ -18,52 +19,6 @@ struct LightBox {
     Vec2 tangent{0, 0};  // largest |x / z| and |y / z| of what lies before the light
     bool crosses = false; // a triangle reaches through the light's plane
 };
-
-// A plane: points where normal . p = offset.
-struct Plane {
-    Vec3 normal{0, 0, 0};
-    double offset = 0;
-};
-
-// The plane that a mesh lies in, to a hundred-thousandth of its size; nothing when it lies in none.
-std::optional<Plane> plane_of(const TriangleMesh& mesh)
-{
-    if (mesh.triangles.empty()) return {};
-    Vec3 normal(0, 0, 0);
-    for (const auto& [a, b, c] : mesh.triangles) {
-        const Vec3 n = (Vec3(mesh.positions[b]) - Vec3(mesh.positions[a])).cross(Vec3(mesh.positions[c]) - Vec3(mesh.positions[a]));
-        if (n.length() > normal.length()) normal = n;
-    }
-    if (!(normal.length() > 0)) return {};
-    Plane plane{normal.normalized(), 0};
-    plane.offset = plane.normal.dot(Vec3(mesh.positions[mesh.triangles.front()[0]]));
-    const double tolerance = 1e-5 * (bounds(mesh).max - bounds(mesh).min).length();
-    for (const Imath::V3f& p : mesh.positions)
-        if (std::abs(plane.normal.dot(Vec3(p)) - plane.offset) > tolerance) return {};
-    return plane;
-}
-
-// Whether a plane object has everything else on the light's side: it casts on no object. Points of depth that was given are not looked at.
-bool is_ground(const Object& object, const LightFrame& light, const std::vector<Object>& objects)
-{
-    if (object.seen || light.directional) return false;
-    const auto plane = plane_of(object.mesh);
-    if (!plane) return false;
-    const double side = plane->normal.dot(light.origin) - plane->offset > 0 ? 1 : -1;
-    const auto before = [&](const Vec3& p) { return side * (plane->normal.dot(p) - plane->offset) >= -1e-5 * (1 + p.length()); };
-    for (const Object& other : objects) {
-        if (&other == &object) continue;
-        for (const Imath::V3f& p : other.mesh.positions)
-            if (!before(Vec3(p))) return false;
-        if (!other.seen) continue;
-        const SeenSurface& seen = *other.seen;
-        for (int y = 0; y < seen.depth.height; ++y)
-            for (int x = 0; x < seen.depth.width; ++x)
-                if (std::isfinite(seen.depth.at(x, y)) && !before(world_point(seen.camera, seen.depth.width, seen.depth.height, x + .5, y + .5, seen.depth.at(x, y))))
-                    return false;
-    }
-    return true;
-}
 
 struct Weighted {
     double tangent, weight;
@@ -171,16 +126,27 @@ void add_mesh(LightBox& result, const LightFrame& light, const Object& object)
     }
 }
 
-LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, bool without_ground)
+LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out)
 {
     LightBox result;
-    for (const Object& object : objects) {
-        if (!object.casts && !object.receives) continue;
-        if (without_ground && (!object.casts || is_ground(object, light, objects))) continue;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const Object& object = objects[i];
+        if ((!object.casts && !object.receives) || (!left_out.empty() && left_out[i])) continue;
         if (object.seen) add_seen(result, light, *object.seen);
         add_mesh(result, light, object);
     }
     return result;
+}
+
+bool is_empty(const LightBox& fit) { return fit.tangent.x == 0 && fit.tangent.y == 0; }
+
+// What may be left out where something reaches through the light's plane: ground, and what does not cast.
+std::vector<bool> all_but_casters(const LightFrame& light, const std::vector<Object>& objects)
+{
+    std::vector<bool> left_out;
+    for (const Object& object : objects) left_out.push_back(!object.casts);
+    for (const Ground& ground : grounds_of(light, objects)) left_out[ground.object] = true;
+    return left_out;
 }
 
 // One texel wider on every side, so that what lies on the border is inside; never flat.
@@ -191,10 +157,14 @@ Vec2 with_margin(const Vec2& half, int width, int height)
     return {wide.x * (1 + 2.0 / width), wide.y * (1 + 2.0 / height)};
 }
 
-Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height,
-               std::string_view where)
+Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out,
+               int width, int height, std::string_view where)
 {
-    const LightBox fit = light_box(light, objects, false);
+    const LightBox whole = light_box(light, objects, {}), part = light_box(light, objects, left_out);
+    LightBox fit = part.box.isEmpty() ? whole : part;
+    // Depths count from before everything, on the map or not.
+    fit.box.min.z = whole.box.min.z;
+    fit.box.max.z = whole.box.max.z;
     if (!spec.half_extent && fit.box.isEmpty())
         throw Error::at(ErrorCode::invalid_input, std::string(where) + ".half_extent", "is missing and there are no objects to fit it to",
                         "expected two positive lengths");
@@ -216,19 +186,19 @@ Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vect
     return light_camera(light, half, center);
 }
 
-Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, int width, int height,
-                 std::string_view where)
+Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out,
+                 int width, int height, std::string_view where)
 {
     if (spec.tan_half_fov) return light_camera(light, *spec.tan_half_fov, light.origin);
 
     const std::string key = std::string(where) + ".tan_half_fov";
-    // Where something reaches through the light's plane, ground that casts on nothing need not be on the map.
-    LightBox fit = light_box(light, objects, false);
+    LightBox fit = light_box(light, objects, left_out);
+    if (is_empty(fit)) fit = light_box(light, objects, {});
     if (fit.crosses) {
-        const LightBox less = light_box(light, objects, true);
-        if (less.tangent.x > 0 || less.tangent.y > 0) fit = less;
+        const LightBox less = light_box(light, objects, all_but_casters(light, objects));
+        if (!is_empty(less)) fit = less;
     }
-    if (fit.tangent.x == 0 && fit.tangent.y == 0)
+    if (is_empty(fit))
         throw Error::at(ErrorCode::invalid_input, key, "is missing and there is nothing before the light to fit it to",
                         "expected two positive tangents");
     return light_camera(light, with_margin(fit.tangent, width, height), light.origin);
@@ -244,7 +214,7 @@ Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3
 }
 
 Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
-                      std::string_view where)
+                      std::string_view where, const std::vector<bool>& left_out)
 {
     Camera camera;
     if (const auto* pinhole = std::get_if<PinholeCamera>(&spec)) {
@@ -255,8 +225,8 @@ Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vec
     } else {
         const LightFrame frame = light_frame(light);
         const auto& of_light = std::get<LightCamera>(spec);
-        camera = frame.directional ? fit_sun(of_light, frame, objects, width, height, where)
-                                   : fit_light(of_light, frame, objects, width, height, where);
+        camera = frame.directional ? fit_sun(of_light, frame, objects, left_out, width, height, where)
+                                   : fit_light(of_light, frame, objects, left_out, width, height, where);
     }
     validate(camera, where);
     return camera;

@@ -12,11 +12,11 @@ namespace penumbra {
 // The camera of the light, looking along its direction, image x along u, image up along v.
 Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3& center);
 
-// Makes a camera ready. A light's camera with parts left out is fitted to the boxes of the objects that cast or receive; throws
-// invalid_input ("<where>.tan_half_fov: ...") when there is nothing to fit to, or when objects lie at or behind the light's plane all
-// round.
+// Makes a camera ready. A light's camera with parts left out is fitted to the objects that cast or receive, but those that `left_out` names (one a
+// object, or empty), as long as others are left; throws invalid_input ("<where>.tan_half_fov: ...") when there is nothing to fit to, or when
+// objects lie at or behind the light's plane all round.
 Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
-                      std::string_view where);
+                      std::string_view where, const std::vector<bool>& left_out = {});
 
 // Throws invalid_input for a frame that is not orthonormal and right-handed (1e-4) or fields of view that are not positive and finite.
 void validate(const Camera& camera, std::string_view where);

@@ -250,7 +250,8 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
                 receivers.d, visibility);
 }
 
-Needs needs(const Smoothie&) { return {.front = true}; }
+// Fins reach beyond what casts, and t is in parts of the view.
+Needs needs(const Smoothie&) { return {.front = true, .whole_view = true}; }
 
 PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoothie& settings, Findings& findings)
 {

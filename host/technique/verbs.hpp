@@ -49,6 +49,8 @@ struct Needs {
     Casters casters = Casters::unused;
     // Casting::images: depth images that cast are traced as they are. Techniques that do not want them get the light's view of them instead.
     bool depth_images = false;
+    // The light's view holds what receives as well, not only what casts on it.
+    bool whole_view = false;
     // Receiving::from_light: what the light sees of the receivers.
     bool receivers_from_light = false;
 };

@@ -18,7 +18,11 @@ template <class List> auto find(List& list, const std::string& key)
 
 template <class List, class Value> void put(List& list, const std::string& key, Value&& value, std::size_t most)
 {
-    if (key.empty() || find(list, key) != list.end()) return;
+    if (key.empty()) return;
+    if (const auto found = find(list, key); found != list.end()) {
+        found->second = std::forward<Value>(value);
+        return;
+    }
     list.emplace_front(key, std::forward<Value>(value));
     if (list.size() > most) list.pop_back();
 }

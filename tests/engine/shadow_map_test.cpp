@@ -145,6 +145,29 @@ TEST(SelfShadow, SoftShadowMapOfATiltedPlane)
     EXPECT_GT(dark_pixels(rectangle_light(0.1, 0.1), {0.1, 0.07}, 3 * size, SoftShadowMap{.sides = Sides::front, .bias = 0}), 1000);
 }
 
+// Where a receiver's own texel shows nothing, the neighbours know its surface: a plane with pinholes stays lit, in the holes as well.
+TEST(SelfShadow, APlaneWithPinholesIsLit)
+{
+    const auto with_holes = [](const Tilt& tilt) {
+        DepthMap map = plane(size, tilt);
+        for (int y = 3; y + 1 < size; y += 7)
+            for (int x = 4; x + 1 < size; x += 5) map.depth[static_cast<std::size_t>(y * size + x)] = nothing_there;
+        return map;
+    };
+    const std::vector<std::pair<Light, Technique>> rows = {
+        {point_light(), ShadowMap{.filter = ShadowFilter::hard}},
+        {point_light(), ShadowMap{.filter = ShadowFilter::percentage_closer, .taps = 3}},
+        {point_light(), ShadowMap{.filter = ShadowFilter::bicubic}},
+        {rectangle_light(0.5, 0.5), SoftShadowMap{.sides = Sides::front}},
+    };
+    for (const auto& [light, technique] : rows)
+        for (const Tilt& tilt : tilts) {
+            const Mask mask = engine().shade(engine().prepare(light, occluders(light_view(), with_holes(tilt)), technique),
+                                             receivers(light_view(), plane(3 * size, tilt)));
+            for (const float v : mask.visibility.pixels) ASSERT_EQ(v, 1) << kind_of(technique) << ": " << tilt.x << ", " << tilt.y;
+        }
+}
+
 // The bound is for receivers on the casters' own surface: an occluder just before a plane still casts its shadow.
 TEST(SelfShadow, BiasTakesNothingFromOtherOccluders)
 {

@@ -99,32 +99,59 @@ inline Overlap overlap(double low, double high, double place, double k, const Re
     return {value, {std::max(0.0, to.low - from.high - e / 2), to.high - from.low + (to.high > from.low ? e / 2 : 0)}};
 }
 
-// The disparity above which a texel counts (the kernel's limits_of): the receiver's own, plus rounding, plus, where the receiver lies
-// on the map's surface, what the stairs of that surface reach. An interval, because the receiver's texel is uncertain within rounding of
-// its border.
+// What the stairs of a texel's surface reach, as the kernel's limits_of has it.
+inline double slope_of(const Map& map, const Texel& texel, const Settings& s)
+{
+    const double bracket = 1 - 0.5 * (texel.step_x / (s.kx * 2 / map.width) + texel.step_y / (s.ky * 2 / map.height));
+    return s.bias * 0.5 * (texel.step_x + texel.step_y) / std::max(bracket, 0.25);
+}
+
+// What the surface that a receiver lies on may reach (the kernel's own_steps), seen from a place on the map: that of its own texel where that
+// explains it, else that of the neighbour that comes nearest to it, else 0. All that rounding leaves possible goes into the interval.
+inline void add_reach(Interval& reach, const Map& map, const Receiver& p, const Settings& s, double column, double row, double off)
+{
+    const double rounding = (8 * e + 2 * s.precision) * p.d;
+    const auto add = [&](double slope) { reach = {std::min(reach.low, slope), std::max(reach.high, slope)}; };
+    // -1: does not explain the receiver; 1: does; 0: too close to tell.
+    const auto explains = [&](const Texel& t, int x, int y, double apart_x, double apart_y) {
+        if (!(t.disparity > 0) || x < 0 || y < 0 || x >= map.width || y >= map.height) return -1;
+        const double beyond = std::abs(t.disparity - p.d) - ((apart_x + 0.5) * t.step_x + (apart_y + 0.5) * t.step_y + rounding);
+        const double unsure = (8 * e + s.disparity_error) * (t.disparity + p.d) + (off + 8 * e * map.width) * t.step_x + (off + 8 * e * map.height) * t.step_y;
+        return beyond > unsure ? -1 : beyond < -unsure ? 1 : 0;
+    };
+    const int cx = static_cast<int>(std::floor(column)), cy = static_cast<int>(std::floor(row));
+    const Texel own = map.at(cx, cy);
+    const int by_own = explains(own, cx, cy, 0.5, 0.5);
+    if (by_own >= 0) add(slope_of(map, own, s));
+    if (by_own == 1) return;
+
+    double least = 1e300; // of the neighbours that surely do
+    for (int y = cy - 1; y <= cy + 1; ++y)
+        for (int x = cx - 1; x <= cx + 1; ++x)
+            if (const Texel t = map.at(x, y); explains(t, x, y, std::abs(column - x - 0.5), std::abs(row - y - 0.5)) == 1)
+                least = std::min(least, std::abs(t.disparity - p.d));
+    if (least == 1e300) add(0);
+    for (int y = cy - 1; y <= cy + 1; ++y)
+        for (int x = cx - 1; x <= cx + 1; ++x) {
+            const Texel t = map.at(x, y);
+            const double unsure = (8 * e + 2 * s.disparity_error) * (t.disparity + p.d);
+            if (explains(t, x, y, std::abs(column - x - 0.5), std::abs(row - y - 0.5)) >= 0 && std::abs(t.disparity - p.d) <= least + unsure)
+                add(slope_of(map, t, s));
+        }
+}
+
+// The disparity above which a texel counts (the kernel's limits_of): the receiver's own, plus rounding, plus what the stairs of its own surface
+// reach. An interval, because the receiver's texel is uncertain within rounding of its border.
 inline Interval limit_of(const Map& map, const Receiver& p, const Settings& s)
 {
     const double rounding = (8 * e + 2 * s.precision) * p.d;
-    Interval limit{1e300, 0};
     const double column = (p.xi + 1) / 2 * map.width, row = (1 - p.eta) / 2 * map.height;
     const double near_border = 4 * e * (std::max(map.width, map.height) + 1) + s.place_error * std::max(map.width, map.height);
+    Interval reach{1e300, 0};
     for (const double dx : {-near_border, near_border})
-        for (const double dy : {-near_border, near_border}) {
-            const int x = static_cast<int>(std::floor(column + dx)), y = static_cast<int>(std::floor(row + dy));
-            const auto [own, covered, sx, sy] = map.at(x, y);
-            const double bracket = 1 - 0.5 * (sx / (s.kx * 2 / map.width) + sy / (s.ky * 2 / map.height));
-            const double slope = s.bias * 0.5 * (sx + sy) / std::max(bracket, 0.25);
-
-            // On the surface, not on it, or too close to tell.
-            const double beyond = std::abs(own - p.d) - (sx + sy + rounding);
-            const double unsure = 8 * e * (own + p.d) + s.disparity_error * (own + p.d);
-            if (own > 0 && beyond <= unsure) limit.high = std::max(limit.high, slope);
-            if (own == 0 || beyond > -unsure) limit.low = 0;
-            if (own > 0) limit.low = std::min(limit.low, slope);
-        }
-    if (limit.low > limit.high) limit.low = limit.high;
-    const double unsure = (8 * e + s.disparity_error) * (p.d + limit.high);
-    return {p.d + rounding + limit.low - unsure, p.d + rounding + limit.high + unsure};
+        for (const double dy : {-near_border, near_border}) add_reach(reach, map, p, s, column + dx, row + dy, 2 * near_border);
+    const double unsure = (8 * e + s.disparity_error) * (p.d + reach.high);
+    return {p.d + rounding + reach.low - unsure, p.d + rounding + reach.high + unsure};
 }
 
 // The share of the light that one map hides from a receiver; above 1 where patches overlap.

@@ -156,10 +156,13 @@ public:
     void prepare(const MaskJob& job, const MaskHooks& hooks) const;
 
     // Prepared state may be shaded many times. The first form takes depth maps alone; ray_traced needs objects: the second or the third.
-    // What the technique needs and `occluders` lack is rendered from the objects.
+    // What the technique needs and `occluders` lack is rendered from the objects. A light's camera that is left to be fitted holds what casts on the
+    // scene's receivers, or on `receivers`: flat ground with nothing behind it is left out. Without receivers ground is held too, and shading
+    // receivers that lie behind ground that was left out warns.
     Prepared prepare(const Light& light, const Occluders& occluders, const Technique& technique) const;
     Prepared prepare(const Scene& scene, const Technique& technique) const;
-    Prepared prepare(const Light& light, const Occluders& occluders, const Geometry& geometry, const Technique& technique) const;
+    Prepared prepare(const Light& light, const Occluders& occluders, const Geometry& geometry, const Technique& technique,
+                     const Receivers* receivers = nullptr) const;
     Prepared prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const;
 
     // The same light, a rectangle, with another emission: silhouettes, hierarchies and all else that does not depend on it are shared with
