@@ -21,20 +21,31 @@ inline float disc_above(const float h, const float a)
     return 1.0f - (acos(t) - t * sqrt(1.0f - t * t)) * M_1_PI_F;
 }
 
+// The point that a pixel shows at planar depth z.
+inline float3 point_of(const DepthSight sight, const int i, const float z)
+{
+    const int x = i % sight.width, y = i / sight.width;
+    const float spread = sight.orthographic ? 1.0f : z;
+    return (float3)((2 * x + 1 - sight.width) * 0.5f * sight.pixel_x * spread, (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y * spread, z);
+}
+
 // clip_at_horizon: visibility becomes the smaller of what it is and the share of the light above the receiver's plane.
 //
 //   light                   in the receivers' camera's coordinates
-//   points, normals [pixels][3]  z = 0: no receiver
+//   points [pixels][3]      of receivers, z = 0: none; where has_points is 0, depth [pixels], planar, in the camera that `sight` describes
+//   normals [pixels][3]     0: not known
+//   textured                the light's parts are not alike: only what lies wholly below the plane is taken away
 //   visibility [pixels][channels]
 //
 // A technique's own shadow of the surface lies below the plane for the most part: the smaller of the two, not their sum.
-__kernel void clip_at_horizon(const DepthLight light, const int channels, __global const float* restrict points, __global const float* restrict normals,
+__kernel void clip_at_horizon(const DepthLight light, const DepthSight sight, const int has_points, const int textured, const int channels,
+                              __global const float* restrict points, __global const float* restrict depth, __global const float* restrict normals,
                               __global float* restrict visibility)
 {
     const int i = get_global_id(0);
     if (i >= light.count) return;
-    const float3 point = vload3(i, points), normal = vload3(i, normals);
-    if (!(point.z > 0.0f)) return;
+    const float3 point = has_points ? vload3(i, points) : point_of(sight, i, depth[i]), normal = vload3(i, normals);
+    if (!(point.z > 0.0f && point.z < MAXFLOAT) || dot(normal, normal) == 0.0f) return;
     const float3 half_u = (float3)(light.half_u[0], light.half_u[1], light.half_u[2]), half_v = (float3)(light.half_v[0], light.half_v[1], light.half_v[2]);
     float3 centre = (float3)(light.centre[0], light.centre[1], light.centre[2]);
     if (!light.endless) centre -= point;
@@ -49,5 +60,6 @@ __kernel void clip_at_horizon(const DepthLight light, const int channels, __glob
     } else {
         share = square_above(h, a, b);
     }
+    if (textured && share > 0.0f) return;
     for (int c = 0; c < channels; ++c) visibility[i * channels + c] = fmin(visibility[i * channels + c], share);
 }

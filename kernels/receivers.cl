@@ -57,6 +57,29 @@ __kernel void receivers_from_points(const ReceiverView view, __global const floa
     store_receiver(view, y * view.stride + x, there, p.x, p.y, p.z, xi, eta, d);
 }
 
+// receiver_planes: each receiver's own plane as the light's view shows it: how its disparity changes with xi and with eta. A plane n . p = c has
+// d = (n.x tx xi + n.y ty eta + n.z) / c there, with tx, ty the view's tangents.
+//
+//   normals [height][width][3]       of the receivers' surfaces, towards their camera, in the camera's coordinates; 0: not known
+//   slope_xi, slope_eta [rows][stride]  NO_PLANE in slope_xi: not known, or the light's centre does not see that side of the plane
+__kernel void receiver_planes(const ReceiverView view, __global const float* restrict normals, __global const float* restrict xi,
+                              __global const float* restrict eta, __global const float* restrict d, __global float* restrict slope_xi,
+                              __global float* restrict slope_eta)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= view.stride || y >= view.rows) return;
+    const int at = y * view.stride + x;
+    const float3 n = vload3(min(y, view.height - 1) * view.width + min(x, view.width - 1), normals);
+    const float nx = (view.light_from_camera[0] * n.x + view.light_from_camera[1] * n.y + view.light_from_camera[2] * n.z) / view.per_light_x;
+    const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
+    const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
+    // n . p over the receiver's depth: negative where the light's centre is before the plane.
+    const float facing = nx * xi[at] + ny * eta[at] + nz;
+    const bool known = x < view.width && y < view.height && d[at] != NO_RECEIVER && !view.light_orthographic && facing < -1e-4f;
+    slope_xi[at] = known ? nx * d[at] / facing : NO_PLANE;
+    slope_eta[at] = known ? ny * d[at] / facing : 0.0f;
+}
+
 inline float least(const float16 v)
 {
     const float8 a = fmin(v.lo, v.hi);

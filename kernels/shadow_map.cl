@@ -8,9 +8,10 @@
 // their jitter); taps = 1 is the hard test.
 //
 //   visibility [height][width]  share of the texels that leave the receiver lit
-__kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision, const int taps,
+__kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision, const int has_planes, const int taps,
                               __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
-                              __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
+                              __global const float* restrict eta, __global const float* restrict d, __global const float* restrict slope_xi,
+                              __global const float* restrict slope_eta, __global float* restrict visibility)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -21,7 +22,8 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
         // The window of texels whose centres lie nearest to the receiver.
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));
-        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 0.5f * taps);
+        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 0.5f * taps);
         sum = 0.0f;
         for (int j = 0; j < taps; ++j)
             for (int i = 0; i < taps; ++i) sum += lit(size, texels, first.x + i, first.y + j, limit);
@@ -31,8 +33,9 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
 
 // shadow_map_bicubic: 4 x 4 comparisons weighted by the cubic B-spline around the receiver (smooth, never outside 0 to 1).
 __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision,
-                                 __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
-                                 __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
+                                 const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
+                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
+                                 __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -43,7 +46,8 @@ __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderVie
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 t = place - 0.5f - convert_float2(low), s = 1.0f - t;
-        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 2.0f);
+        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 2.0f);
 
         // The B-spline's four weights along each axis; they sum to 1.
         const float2 w[4] = {s * s * s / 6.0f, (4.0f - 6.0f * t * t + 3.0f * t * t * t) / 6.0f, (4.0f - 6.0f * s * s + 3.0f * s * s * s) / 6.0f,

@@ -213,10 +213,11 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
 //
 // Launched over the receivers.
 __kernel void smoothie_composite(const ReceiverView receivers, const OccluderView occluders, const SmoothieView view, const float bias, const float precision,
-                                 __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict distances,
-                                 __global const float* restrict depths, __global const float* restrict inner_distances,
-                                 __global const float* restrict inner_depths, __global const float* restrict xi,
-                                 __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
+                                 const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
+                                 __global const float* restrict distances, __global const float* restrict depths, __global const float* restrict inner_distances,
+                                 __global const float* restrict inner_depths, __global const float* restrict xi, __global const float* restrict eta,
+                                 __global const float* restrict d, __global const float* restrict slope_xi, __global const float* restrict slope_eta,
+                                 __global float* restrict visibility)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -225,7 +226,8 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
     float seen = 1.0f;
     if (shaded(occluders, place, d[at])) {
         const float rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d[at];
-        const float limit = d[at] + bias_of(occluders, texels, steps, place, d[at], bias, precision, 1.0f);
+        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 1.0f);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 part = place - 0.5f - convert_float2(low);
         seen = 0.0f;
@@ -234,10 +236,10 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
                 const int tx = low.x + i, ty = low.y + j, texel = ty * occluders.width + tx;
                 float v = 1.0f;
                 if (tx >= 0 && ty >= 0 && tx < occluders.width && ty < occluders.height) {
-                    const bool hidden = texels[texel].x > limit;
+                    const bool hidden = shadows(limit, tx, ty, texels[texel].x);
                     if (hidden) {
                         v = 0.0f;
-                        if (view.two_sided && inner_distances[texel] >= 0.0f && inner_depths[texel] > limit)
+                        if (view.two_sided && inner_distances[texel] >= 0.0f && shadows(limit, tx, ty, inner_depths[texel]))
                             v = fmax(0.5f - 0.5f * inner_distances[texel] / WIDTH_OF(view, inner_depths[texel], d[at]), 0.0f);
                     } else if (depths[texel] > d[at] + rounding) {
                         v = fmin(distances[texel] / WIDTH_OF(view, depths[texel], d[at]), 1.0f);

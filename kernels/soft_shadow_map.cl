@@ -16,7 +16,7 @@
 #include "common/half_rounding.clh"
 #include "common/own_surface.clh"
 
-// From which disparity on an occluder counts for a receiver: d + bias.
+// From which disparity on an occluder counts for a receiver whose own plane is not known: d + bias.
 //
 // A receiver on the occluder map's own surface must not be shadowed by the stairs that the micro-patches make of that surface. Take the
 // surface as a plane with disparity steps (sx, sy) a texel, the receiver on it, and D = d_texel - d_receiver. A texel reaches the light only
@@ -26,14 +26,16 @@
 // the surface and no bound exists; it is held at 1/4 (a bias of two texel steps).
 // Which texels are of the receiver's surface: common/own_surface.clh. Elsewhere only rounding counts.
 inline floatn limits_of(const OccluderView occluders, const float bias, const float precision, __global const float2* texels,
-                        __global const float2* steps, const floatn xi, const floatn eta, const floatn d)
+                        __global const float2* steps, const floatn xi, const floatn eta, const floatn d, const intn known)
 {
     float column[LANES], row[LANES], disparity[LANES], step_x[LANES], step_y[LANES];
+    int skipped[LANES];
+    store_int_lanes(known, skipped);
     store_lanes((xi + 1.0f) * (0.5f * occluders.width), column);
     store_lanes((1.0f - eta) * (0.5f * occluders.height), row);
     store_lanes(d, disparity);
     for (int lane = 0; lane < LANES; ++lane) {
-        const float2 own = own_steps((int2)(occluders.width, occluders.height), texels, steps, (float2)(column[lane], row[lane]), disparity[lane], precision);
+        const float2 own = skipped[lane] ? (float2)(0.0f) : own_steps((int2)(occluders.width, occluders.height), texels, steps, (float2)(column[lane], row[lane]), disparity[lane], precision);
         step_x[lane] = own.x;
         step_y[lane] = own.y;
     }
@@ -42,6 +44,26 @@ inline floatn limits_of(const OccluderView occluders, const float bias, const fl
     const floatn bracket = 1.0f - (sx * occluders.edge_on_x + sy * occluders.edge_on_y);
     const floatn slope = bias * 0.5f * (sx + sy) / select_lanes((floatn)(0.25f), bracket, bracket > 0.25f);
     return d + (8.0f * 0x1p-24f + 2.0f * precision) * d + slope;
+}
+
+// From which disparity on occluders count for receivers: above `least`, and above their own plane, which is level + slope_xi xi + slope_eta eta.
+// A texel of the plane itself lies on it at the texel's middle; half a texel's steps more leave room for surfaces that bend.
+// Where no plane is known the slopes are 0.
+typedef struct {
+    floatn least, level, slope_xi, slope_eta;
+} Limits;
+
+inline Limits limits_with_planes(const OccluderView occluders, const float bias, const float precision, const int has_planes, __global const float2* texels,
+                                 __global const float2* steps, const floatn slope_xi, const floatn slope_eta, const floatn xi, const floatn eta, const floatn d)
+{
+    const intn known = has_planes ? slope_xi != NO_PLANE : (intn)(0);
+    const Limits flat = {limits_of(occluders, bias, precision, texels, steps, xi, eta, d, known), (floatn)(-MAXFLOAT), (floatn)(0.0f), (floatn)(0.0f)};
+    if (!has_planes) return flat;
+    const floatn gx = select_lanes((floatn)(0.0f), slope_xi, known), gy = select_lanes((floatn)(0.0f), slope_eta, known);
+    const floatn least = d + (8.0f * 0x1p-24f + 2.0f * precision) * d;
+    const floatn level = least + bias * 0.5f * (fabs(gx) * occluders.texel_x + fabs(gy) * occluders.texel_y) - gx * xi - gy * eta;
+    const Limits limits = {select_lanes(flat.least, least, known), select_lanes(flat.level, level, known), gx, gy};
+    return limits;
 }
 
 // Adds u v to a sum. With binary32 the product is not rounded on its own.
@@ -93,7 +115,7 @@ inline int4 window(const Search search, const float nearest, const float2 cell, 
 
 // A texel that can hide some of the light from the tile, and where its left and right edges lie.
 typedef struct {
-    float d, covered, a0, a1;
+    float d, covered, a0, a1, middle;
 } Patch;
 
 // Adds the shares of a row of patches for LANES receivers (3.4 and 4.2: back-project, intersect, multiply).
@@ -101,9 +123,10 @@ typedef struct {
 // N.B. Every edge is projected on its own: neighbours then share it to the bit. u(a1) = u(a0) + h k / (d - d_p) would spare a subtraction but move
 // the edge by 2^-24 of the texel, which is more than the whole light when that is a point, and a receiver on a border would see between texels.
 inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const int count, const float b0, const float b1, const float2 scale,
-                        const floatn xi, const floatn eta, const floatn d, const floatn limit)
+                        const floatn xi, const floatn eta, const floatn d, const Limits limits)
 {
     const floatn below = b0 - eta, above = b1 - eta;
+    const floatn plane = fma((floatn)(0.5f * (b0 + b1)), limits.slope_eta, limits.level);
     floatn total = *sum, rest = *lost;
     for (int i = 0; i < count; ++i) {
         const Patch patch = patches[i];
@@ -111,7 +134,8 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
         const floatn du = scale.x * reach, dv = scale.y * reach;
         const floatn u = saturate(fma(patch.a1 - xi, du, (floatn)(0.5f))) - saturate(fma(patch.a0 - xi, du, (floatn)(0.5f)));
         const floatn v = saturate(fma(above, dv, (floatn)(0.5f))) - saturate(fma(below, dv, (floatn)(0.5f)));
-        const floatn counted = select_lanes((floatn)(0.0f), u, patch.d > limit);
+        const intn before = (patch.d > limits.least) & (patch.d > fma((floatn)(patch.middle), limits.slope_xi, plane));
+        const floatn counted = select_lanes((floatn)(0.0f), u, before);
         ACCUMULATE(total, rest, counted, v * patch.covered);
     }
     *sum = total;
@@ -129,6 +153,7 @@ inline int patches_of_row(Patch* patches, __global const float2* texels, const i
         patches[found].covered = t.y;
         patches[found].a0 = i * search.texel.x - 1.0f;
         patches[found].a1 = (i + 1) * search.texel.x - 1.0f;
+        patches[found].middle = (i + 0.5f) * search.texel.x - 1.0f;
         ++found;
     }
     return found;
@@ -154,22 +179,25 @@ inline void write_visibility(__global float* to, const floatn seen, const int le
 //   steps [height][width]       disparity steps of the map's surface
 //   bounds [tiles]              boxes of the tiles of receivers
 //   bias, precision             see limits_of
+//   has_planes, slope_xi, slope_eta   the receivers' own planes (receiver_planes), where they are known
 //   visibility [height][width]  1 - occlusion, 0 to 1. With `merge` the smaller of that and what is there (3.5: the larger occlusion of two maps)
 //   evaluated [tiles]           texels that were evaluated against the tile's receivers, added to what is there with `merge`
 //
 // Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Texels are added in one order, whatever the tile, so the same receiver
 // gets the same bits under any tiling.
 __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView occluders, const int merge, const float nearest, const float bias,
-                              const float precision, __global const float2* restrict texels, __global const float2* restrict steps,
+                              const float precision, const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
                               __global const float* restrict blocks, __global const float* restrict superblocks, __global const float8* restrict bounds,
                               __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                              __global float* restrict visibility, __global uint* restrict evaluated)
+                              __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
+                              __global uint* restrict evaluated)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= receivers.stride || y >= receivers.rows) return;
     const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
 
-    floatn sum[ITEM_ROWS], lost[ITEM_ROWS], limit[ITEM_ROWS];
+    floatn sum[ITEM_ROWS], lost[ITEM_ROWS];
+    Limits limits[ITEM_ROWS];
     for (int row = 0; row < ITEM_ROWS; ++row) sum[row] = lost[row] = (floatn)(0.0f);
     uint count = 0;
 
@@ -199,9 +227,11 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                     for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
                         const int at = (y + row) * receivers.stride + x;
                         const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
-                        if (first_found) limit[row] = limits_of(occluders, bias, precision, texels, steps, own_xi, own_eta, own_d);
+                        if (first_found)
+                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, texels, steps, has_planes ? load_lanes(slope_xi + at) : own_d,
+                                                             has_planes ? load_lanes(slope_eta + at) : own_d, own_xi, own_eta, own_d);
                         add_patches(&sum[row], &lost[row], patches, found, 1.0f - (j + 1) * search.texel.y, 1.0f - j * search.texel.y, scale, own_xi,
-                                    own_eta, own_d, limit[row]);
+                                    own_eta, own_d, limits[row]);
                     }
                 }
             }

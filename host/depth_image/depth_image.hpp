@@ -35,6 +35,11 @@ struct DepthSurface {
     DepthQuality quality;
 };
 
+// Of the surface through each pixel's centre, towards the camera, in its coordinates; 0 where nothing is seen.
+struct SurfaceNormals {
+    std::vector<DepthVector> directions; // [height][width]
+};
+
 // Lifted along the normal by .6 of the pixel's footprint times the sine of the angle of view, by what the plane may be off, and by 1e-5 of
 // the depth.
 DepthSurface depth_surface(const DepthFit& fit, const Camera& camera);

@@ -32,15 +32,21 @@ DepthLight depth_light(const Light& light, const Camera& image, const Camera& re
 
 opencl::Specialisation horizon_program() { return {"horizon.cl", {}}; }
 
-void clip_at_horizon(opencl::Work& work, const Light& light, const DepthSurface& surface, int channels, const cl::Buffer& visibility)
+void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, const cl::Buffer& visibility)
 {
-    work.stage("clip at horizon");
-    DepthLight seen = depth_light(light, surface.camera, surface.camera);
-    seen.count = static_cast<int>(surface.points.size());
-    const auto points = work.upload(std::span<const DepthVector>(surface.points), "receiver points");
-    const auto normals = work.upload(std::span<const DepthVector>(surface.normals), "receiver normals");
-    work.launch(horizon_program(), "clip_at_horizon", {surface.points.size(), 1}, {64, 1}, 2 * points.bytes(), seen, static_cast<cl_int>(channels),
-                points, normals, visibility);
+    DepthLight seen = depth_light(horizon.light, horizon.camera, horizon.camera);
+    const std::size_t count = static_cast<std::size_t>(horizon.width) * static_cast<std::size_t>(horizon.height);
+    seen.count = static_cast<int>(count);
+    const auto* rectangle = std::get_if<RectangleLight>(&horizon.light);
+    const DepthSight sight{.image_from_camera = {},
+                           .pixel_x = static_cast<float>(2 * horizon.camera.half_extent.x / horizon.width),
+                           .pixel_y = static_cast<float>(2 * horizon.camera.half_extent.y / horizon.height),
+                           .width = horizon.width,
+                           .height = horizon.height,
+                           .orthographic = horizon.camera.orthographic};
+    work.launch(horizon_program(), "clip_at_horizon", {count, 1}, {64, 1}, count * 28, seen, sight, static_cast<cl_int>(horizon.points.get() != nullptr),
+                static_cast<cl_int>(rectangle && rectangle->emission), static_cast<cl_int>(channels), horizon.points, horizon.depth, horizon.normals,
+                visibility);
 }
 
 } // namespace penumbra

@@ -12,8 +12,18 @@ namespace penumbra {
 // The light's place in the coordinates of `image`, and how receivers come there from those of `receivers`. The caller sets the rest.
 DepthLight depth_light(const Light& light, const Camera& image, const Camera& receivers);
 
-// Clips the visibility of receivers on fitted surfaces at their own planes. `visibility`: [height][width][channels] on the device.
-void clip_at_horizon(opencl::Work& work, const Light& light, const DepthSurface& surface, int channels, const cl::Buffer& visibility);
+// Clips the visibility of receivers at their own planes. Of a textured light nothing but what lies wholly below.
+//
+//   points      [height][width] in the camera's coordinates, as DepthSurface has them; or `depth`, planar, in their place
+//   normals     [height][width] towards the camera; 0: not clipped
+//   visibility  [height][width][channels]
+struct Horizon {
+    const Light& light;
+    Camera camera;
+    int width, height;
+    cl::Buffer points, depth, normals;
+};
+void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, const cl::Buffer& visibility);
 
 // The program of horizon.cl.
 opencl::Specialisation horizon_program();

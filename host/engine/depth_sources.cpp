@@ -108,10 +108,11 @@ Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camer
                const std::shared_ptr<const opencl::Context>& context, bool with_images)
 {
     const Geometry::State& state = geometry.state();
-    Views views{empty_view(width, height), empty_view(width, height)};
+    Views views{empty_view(width, height), empty_view(width, height), {}};
     if (state.any_mesh(role)) {
         const auto tracer = role == &Object::casts ? state.casters() : state.receivers();
-        if (front) views.front = tracer->front(camera, width, height);
+        const bool exact = role == &Object::receives && !(with_images && state.any_seen(role));
+        if (front) views.front = tracer->front(camera, width, height, exact ? &views.normals : nullptr);
         if (back) views.back = tracer->back(camera, width, height);
     }
     if (!with_images) return views;
@@ -159,7 +160,9 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
         resolve_camera(receivers.camera, light, geometry.objects(), receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {
         if (!geometry.state().any(&Object::receives)) missing("receivers.depth", "receive");
-        receivers.depth = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, context).front;
+        Views views = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, context);
+        receivers.depth = std::move(views.front);
+        receivers.normals = views.normals.empty() ? nullptr : std::make_shared<const SurfaceNormals>(SurfaceNormals{std::move(views.normals)});
         // What was seen of a depth image is as good as its planes.
         receivers.depth->from_image = geometry.state().any_seen(&Object::receives);
     }

@@ -35,6 +35,7 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
 // What a camera sees of the objects of a role: triangles by rays, depth images by walks. What is not asked for is empty.
 struct Views {
     DepthMap front, back;
+    std::vector<DepthVector> normals; // of the front's triangles, towards the camera and in its coordinates; empty where images are among it
 };
 Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
                const std::shared_ptr<const opencl::Context>& context, bool with_images = true);

@@ -89,6 +89,31 @@ void shade_technique(opencl::Work& work, const Prepared::State& state, const Rec
     std::visit([&](const auto& prepared) { shade(work, prepared, receivers, shaded); }, state.data);
 }
 
+// The normals of the receivers' surfaces: fitted, or of what the depth was rendered from. None where neither is known.
+opencl::Buffer<DepthVector> upload_normals(opencl::Work& work, const Receivers& receivers, const DepthSurface* surface)
+{
+    const std::vector<DepthVector>* normals = surface ? &surface->normals : receivers.normals ? &receivers.normals->directions : nullptr;
+    if (!normals || normals->size() != receivers.depth->depth.size()) return {};
+    work.stage("upload receivers");
+    return work.upload(std::span<const DepthVector>(*normals), "receiver normals");
+}
+
+// Clips the light at the receivers' own planes.
+void clip(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, const cl::Buffer& visibility)
+{
+    work.stage("clip at horizon");
+    Horizon horizon{.light = state.light, .camera = receivers.camera, .width = receivers.width, .height = receivers.height, .points = {}, .depth = {}, .normals = receivers.normals->memory()};
+    opencl::Buffer<DepthVector> points;
+    opencl::Buffer<float> depth;
+    if (receivers.surface)
+        points = work.upload(std::span<const DepthVector>(receivers.surface->points), "receiver points");
+    else
+        depth = work.upload(std::span<const float>(receivers.depth->depth), "receiver depth");
+    horizon.points = points.memory();
+    horizon.depth = depth.memory();
+    clip_at_horizon(work, horizon, state.channels, visibility);
+}
+
 // What the technique made, on the host.
 Image image_of(opencl::Work& work, const Prepared::State& state, const Receivers& receivers, const opencl::Buffer<float>& visibility,
                Shaded& shaded)
@@ -114,16 +139,20 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
 
     const Stopwatch total;
+    // Techniques that trace depth images clip the light sample by sample.
+    const bool traces_images = needs_of(state.technique).depth_images;
     const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.context);
     const double fit_ms = total.ms();
     Mask mask{.visibility = {}, .report = report_of(state, receivers.width, receivers.height)};
     opencl::Work work(state.context);
+    const opencl::Buffer<DepthVector> normals = traces_images ? opencl::Buffer<DepthVector>() : upload_normals(work, receivers, surface.get());
     const Receiving receiving{.camera = camera,
                               .width = receivers.width,
                               .height = receivers.height,
                               .depth = &*receivers.depth,
                               .device_depth = {},
                               .surface = surface.get(),
+                              .normals = normals ? &normals : nullptr,
                               .view = state.light_view,
                               .from_light = [&](int resolution) {
                                   check_pixels(resolution, resolution, "technique.project_resolution");
@@ -147,9 +176,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     ShadeCounts counts;
     Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .bound = bound ? &mask.bound : nullptr};
     shade_technique(work, state, receiving, shaded);
-    // Techniques that trace depth images clip the light sample by sample.
-    if (surface && visibility && !needs_of(state.technique).depth_images)
-        clip_at_horizon(work, state.light, *surface, state.channels, visibility.memory());
+    if (normals && visibility) clip(work, state, receiving, visibility.memory());
     mask.visibility = image_of(work, state, receivers, visibility, shaded);
 
     add_stages(mask.report.stages, work.finish());
@@ -180,6 +207,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .depth = nullptr,
                               .device_depth = cl::Buffer(receivers.depth, true),
                               .surface = nullptr,
+                              .normals = nullptr,
                               .view = state.light_view,
                               .from_light = {}};
     Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr, .bound = nullptr};

@@ -48,7 +48,9 @@ ReceiverPoints room_for_points(opencl::Work& work, const ReceiverView& view, dou
             .precision = precision,
             .xi = work.buffer<float>(count, "receivers' xi"),
             .eta = work.buffer<float>(count, "receivers' eta"),
-            .d = work.buffer<float>(count, "receivers' disparity")};
+            .d = work.buffer<float>(count, "receivers' disparity"),
+            .slope_xi = {},
+            .slope_eta = {}};
 }
 
 } // namespace
@@ -60,6 +62,16 @@ ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& vi
     work.launch(program, "receivers_from_points", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
                 points.d.bytes() * 6, view, lifted, points.xi, points.eta, points.d);
     return points;
+}
+
+void add_planes(opencl::Work& work, ReceiverPoints& points, const opencl::Buffer<DepthVector>& normals, const opencl::Specialisation& program)
+{
+    const ReceiverView& view = points.view;
+    points.slope_xi = work.buffer<float>(points.d.count(), "receivers' slopes in xi");
+    points.slope_eta = work.buffer<float>(points.d.count(), "receivers' slopes in eta");
+    points.has_planes = true;
+    work.launch(program, "receiver_planes", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
+                points.d.bytes() * 8, view, normals, points.xi, points.eta, points.d, points.slope_xi, points.slope_eta);
 }
 
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,

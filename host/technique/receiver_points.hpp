@@ -21,6 +21,9 @@ struct ReceiverPoints {
     ReceiverView view{};
     double precision = 0; // of the depth they came from, relative
     opencl::Buffer<float> xi, eta, d;
+    // How disparity changes along each receiver's own plane (receivers.cl, receiver_planes); none: planes are not known.
+    opencl::Buffer<float> slope_xi, slope_eta;
+    bool has_planes = false;
 };
 
 // The transform from `camera` to the space of the light's own view.
@@ -33,5 +36,8 @@ ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, con
 // The same of points in the camera's coordinates, [view.height][view.width]; z = 0: no receiver.
 ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& points, double precision,
                                       const opencl::Specialisation& program = receivers_program());
+
+// Gives the points their planes. `normals`: of their surfaces, towards the camera, in its coordinates, [view.height][view.width].
+void add_planes(opencl::Work& work, ReceiverPoints& points, const opencl::Buffer<DepthVector>& normals, const opencl::Specialisation& program = receivers_program());
 
 } // namespace penumbra

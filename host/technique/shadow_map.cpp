@@ -54,14 +54,15 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
     const opencl::Specialisation& program = prepared.program;
+    const auto has_planes = static_cast<cl_int>(receivers.has_planes);
     if (prepared.settings.filter == ShadowFilter::bicubic) {
-        work.launch(program, "shadow_map_bicubic", grid, {16, 8}, bytes, view, prepared.view, bias, precision, prepared.map.texels,
-                    prepared.map.steps, receivers.xi, receivers.eta, receivers.d, visibility);
+        work.launch(program, "shadow_map_bicubic", grid, {16, 8}, bytes, view, prepared.view, bias, precision, has_planes, prepared.map.texels,
+                    prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
         return;
     }
     const cl_int taps = prepared.settings.filter == ShadowFilter::hard ? 1 : prepared.settings.taps;
-    work.launch(program, "shadow_map_taps", grid, {16, 8}, bytes, view, prepared.view, bias, precision, taps, prepared.map.texels,
-                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, visibility);
+    work.launch(program, "shadow_map_taps", grid, {16, 8}, bytes, view, prepared.view, bias, precision, has_planes, taps, prepared.map.texels,
+                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
 }
 
 Needs needs(const ShadowMap&) { return {.front = true}; }

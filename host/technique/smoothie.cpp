@@ -246,8 +246,8 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(receivers.view.width), static_cast<std::size_t>(receivers.view.height)};
     work.launch(prepared.program, "smoothie_composite", grid, {16, 8}, grid[0] * grid[1] * 16, receivers.view, prepared.occluders, view,
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),
-                prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
-                receivers.d, visibility);
+                static_cast<cl_int>(receivers.has_planes), prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
+                receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
 }
 
 // Fins reach beyond what casts, and t is in parts of the view.

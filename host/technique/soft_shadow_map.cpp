@@ -65,8 +65,8 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
     const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
     work.launch(prepared.program, "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
-                static_cast<cl_int>(merge), prepared.nearest, bias, precision, side.map.texels, side.map.steps, side.blocks,
-                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, visibility, evaluated);
+                static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
+                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated);
 }
 
 // Shades what the light sees of the receivers, and samples that mask from the receivers' camera (3.1).

@@ -11,7 +11,9 @@ ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera
     return receiver_points(work, receiver_view(camera, depth.width, depth.height, view), uploaded.memory(), depth.precision, program);
 }
 
-ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
+namespace {
+
+ReceiverPoints points_without_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
 {
     if (receivers.surface) {
         const DepthSurface& surface = *receivers.surface;
@@ -24,6 +26,15 @@ ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const o
     if (receivers.depth) return points_of(work, *receivers.depth, receivers.camera, receivers.view, program);
     const ReceiverView view = receiver_view(receivers.camera, receivers.width, receivers.height, receivers.view);
     return receiver_points(work, view, receivers.device_depth, 0x1p-24, program);
+}
+
+} // namespace
+
+ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
+{
+    ReceiverPoints points = points_without_planes(work, receivers, program);
+    if (receivers.normals) add_planes(work, points, *receivers.normals, program);
+    return points;
 }
 
 std::vector<TriangleMesh> surfaces_of(const LightDepth& maps, bool back)

@@ -93,6 +93,8 @@ struct Receiving {
     const DepthMap* depth = nullptr;
     cl::Buffer device_depth; // where there is no `depth`
     const DepthSurface* surface = nullptr; // what was fitted to `depth`, where it is somebody else's: lifted points and their normals
+    // Of each pixel's surface, towards the camera and in its coordinates; null: not known.
+    const opencl::Buffer<DepthVector>* normals = nullptr;
     const Camera& view;      // Findings::view
     // Depth of the receivers in that view, resolution x resolution. Empty unless Needs asked for it.
     std::function<DepthMap(int resolution)> from_light;
@@ -138,7 +140,7 @@ struct DeviceBuffers {
 };
 
 // Receiver points of depth that is on the host (uploaded in a stage of its own) or on the device already, for a technique whose `program`
-// has the kernel. The stage "receivers" or the running one is left running.
+// has the kernel; with their planes where normals are known. The stage "receivers" or the running one is left running.
 ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
 ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera& camera, const Camera& view,
                          const opencl::Specialisation& program);

@@ -35,13 +35,25 @@ template <class Visit> void for_each_pixel(const Tracer::Impl& scene, const Came
 
 float world_depth(const Tracer::Impl& scene, const Crossing& crossing) { return static_cast<float>(crossing.depth / scene.scale); }
 
+// Of the crossing's triangle, towards the camera and in its coordinates.
+DepthVector normal_of(const Tracer::Impl& scene, const Crossing& crossing, const Camera& camera)
+{
+    const Vec3 a = scene.corner(crossing.triangle, 0);
+    const Vec3 outward = (scene.corner(crossing.triangle, 1) - a).cross(scene.corner(crossing.triangle, 2) - a).normalized();
+    const Vec3 normal = crossing.leaves ? -outward : outward;
+    return {static_cast<float>(normal.dot(camera.frame.x)), static_cast<float>(normal.dot(camera.frame.y)), static_cast<float>(-normal.dot(camera.frame.z))};
+}
+
 } // namespace
 
-DepthMap Tracer::front(const Camera& camera, int width, int height) const
+DepthMap Tracer::front(const Camera& camera, int width, int height, std::vector<DepthVector>* normals) const
 {
     DepthMap map = empty_map(width, height);
-    for_each_pixel(*impl_, camera, width, height,
-                   [&](int x, int y, const std::vector<Crossing>& crossings) { map.at(x, y) = world_depth(*impl_, crossings.front()); });
+    if (normals) normals->assign(map.depth.size(), DepthVector{0, 0, 0});
+    for_each_pixel(*impl_, camera, width, height, [&](int x, int y, const std::vector<Crossing>& crossings) {
+        map.at(x, y) = world_depth(*impl_, crossings.front());
+        if (normals) (*normals)[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] = normal_of(*impl_, crossings.front(), camera);
+    });
     return map;
 }
 

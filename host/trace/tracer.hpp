@@ -27,7 +27,8 @@ public:
     std::uint64_t bytes() const; // of the hierarchy, as Embree's memory monitor counts
 
     // Depth of what the camera sees through each pixel's centre.
-    DepthMap front(const Camera& camera, int width, int height) const; // nearest surface
+    // nearest surface; `normals`, where it is not null: of its triangle, towards the camera and in its coordinates, 0 where nothing is seen
+    DepthMap front(const Camera& camera, int width, int height, std::vector<DepthVector>* normals = nullptr) const;
     DepthMap back(const Camera& camera, int width, int height) const;  // furthest back-facing surface (normal along the ray)
     // Surfaces 0, 1, ... `count` - 1 along each ray in order of depth (0 is `front`). The same hit reported by two triangles that share an
     // edge counts once.

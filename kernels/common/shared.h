@@ -17,6 +17,9 @@
 // the arithmetic.
 #define NO_RECEIVER 3.402823466e+38f
 
+// Slope of a receiver whose plane is not known.
+#define NO_PLANE 3.402823466e+38f
+
 // Occluder texels beside each other in a block of the depth pyramid, and blocks in a block of the next level.
 #define BLOCK 8
 

@@ -28,7 +28,9 @@ std::vector<float> clipped(const Light& light, const DepthSurface& surface, cons
 {
     opencl::Work work(device_context(true));
     const auto on_device = work.upload(std::span<const float>(visibility), "visibility");
-    clip_at_horizon(work, light, surface, channels, on_device.memory());
+    const auto points = work.upload(std::span<const DepthVector>(surface.points), "points");
+    const auto normals = work.upload(std::span<const DepthVector>(surface.normals), "normals");
+    clip_at_horizon(work, {light, surface.camera, surface.width, surface.height, points.memory(), {}, normals.memory()}, channels, on_device.memory());
     auto result = work.read(on_device);
     work.finish();
     return result;

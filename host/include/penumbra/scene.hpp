@@ -125,6 +125,7 @@ struct PinholeCamera {
 using CameraSpec = std::variant<LightCamera, PinholeCamera>;
 
 struct DepthSurface; // of an Engine
+struct SurfaceNormals;
 
 // --- What casts and what receives ----------------------------------------------------------------------------------------------
 
@@ -165,6 +166,8 @@ struct Receivers {
     std::optional<DepthMap> depth;
     // What was fitted to a depth image that somebody else may have made: an Engine makes it where it is missing.
     std::shared_ptr<const DepthSurface> surface = {};
+    // The normals of what an Engine rendered `depth` from (with_depth). Who changes the depth clears them.
+    std::shared_ptr<const SurfaceNormals> normals = {};
 };
 
 // --- The scene -----------------------------------------------------------------------------------------------------------------
