@@ -35,7 +35,7 @@ double place_tolerance(const LightFrame& light, const Vec3& origin)
 LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, const Needs& needs, const Receivers* receivers)
 {
     LeftOut result;
-    if (needs.whole_view) return result;
+    if (needs.whole_view || (needs.depth_images && !needs.front)) return result;
     for (const Object& object : objects) result.objects.push_back(!object.casts);
     if (!receivers) return result;
     std::vector<Ground> grounds = grounds_of(light_frame(light), objects);

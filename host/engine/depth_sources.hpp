@@ -16,7 +16,7 @@ struct LeftOut {
 };
 
 // For these receivers; null: they are not known, and ground stays, as something behind it may be shaded later. Nothing where the technique needs the
-// whole view.
+// whole view, or traces rays.
 LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, const Needs& needs, const Receivers* receivers);
 
 // The light's own view at the occluder map's size. Throws invalid_input when the scene says another camera than the light's.

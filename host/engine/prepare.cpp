@@ -111,12 +111,17 @@ LightDepth depth_of(const Light& light, const Occluders& occluders, const std::v
     return depth;
 }
 
-std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry)
+// Without ground, as long as there is anything else.
+std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry, const LeftOut& left_out)
 {
-    std::vector<const TriangleMesh*> meshes;
-    for (const Object& object : geometry.objects())
-        if (object.casts && !object.seen) meshes.push_back(&object.mesh);
-    return meshes;
+    std::vector<const TriangleMesh*> meshes, all;
+    for (std::size_t i = 0; i < geometry.objects().size(); ++i) {
+        const Object& object = geometry.objects()[i];
+        if (!object.casts || object.seen) continue;
+        all.push_back(&object.mesh);
+        if (left_out.objects.empty() || !left_out.objects[i]) meshes.push_back(&object.mesh);
+    }
+    return meshes.empty() ? all : meshes;
 }
 
 // Ends the work and notes in the state what it took.
@@ -233,11 +238,11 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     // Of a technique that traces images alone, meshes are what the light sees of them.
     if (needs.depth_images && or_front) needs.front = objects.any_mesh(&Object::casts);
     const bool maps = needs.front || needs.back;
-    const LeftOut left_out = maps ? left_out_of(light, geometry.objects(), needs, receivers) : LeftOut{};
+    const LeftOut left_out = left_out_of(light, geometry.objects(), needs, receivers);
     state->grounds = left_out.grounds;
     Casting casting{.light = state->light,
                     .depth = {},
-                    .meshes = by_view ? std::vector<const TriangleMesh*>{} : casting_meshes(geometry),
+                    .meshes = by_view ? std::vector<const TriangleMesh*>{} : casting_meshes(geometry, left_out),
                     .topology = [&] { return objects.topology(); },
                     .tracer = [&] { return objects.casters(); },
                     .images = {}};

@@ -144,10 +144,11 @@ TEST(SlicesReceivers, OnAndBetweenPlanes)
 {
     // Planes at 4, 5, 6, 7, 8: sheets over the whole view in the first and the last slice.
     const std::vector<TriangleMesh> casters = {sheet(-20, 20, -20, 20, 4), sheet(-20, 20, -20, 20, 8)};
+    // Prepared for any receivers: for these alone the last sheet is ground, and no slice would be made for it.
     const auto seen = [&](float z, SelfShadow self) {
-        return mask_of(scene_of(rectangle_light(1, 1), casters, floor_at(z, 3, 0.1)),
-                       OcclusionTexture{.slices = 4, .resolution = 16, .self_shadow = self})
-            .at(1, 1);
+        const Scene scene = scene_of(rectangle_light(1, 1), casters, floor_at(z, 3, 0.1));
+        const Prepared prepared = engine().prepare(scene.light, scene.occluders, Geometry(scene.objects), OcclusionTexture{.slices = 4, .resolution = 16, .self_shadow = self});
+        return engine().shade(prepared, scene.receivers).visibility.at(1, 1);
     };
     for (const SelfShadow self : {SelfShadow::fade, SelfShadow::own, SelfShadow::omit}) {
         EXPECT_EQ(seen(1, self), 1.0f);
