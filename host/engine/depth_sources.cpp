@@ -36,7 +36,7 @@ LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, cons
 {
     LeftOut result;
     if (needs.whole_view || (needs.depth_images && !needs.front)) return result;
-    for (const Object& object : objects) result.objects.push_back(!object.casts);
+    result.receivers = true;
     if (!receivers) return result;
     std::vector<Ground> grounds = grounds_of(light_frame(light), objects);
     // Receivers that are rendered from the objects lie before ground, as those do.
@@ -44,7 +44,6 @@ LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, cons
         const Camera camera = resolve_camera(receivers->camera, light, objects, receivers->width, receivers->height, "receivers.camera");
         if (shows_behind(grounds, *receivers->depth, camera)) return result;
     }
-    for (const Ground& ground : grounds) result.objects[ground.object] = true;
     result.grounds = std::move(grounds);
     return result;
 }
@@ -53,7 +52,7 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
                        const LeftOut& left_out)
 {
     const LightFrame frame = light_frame(light);
-    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera", left_out.objects);
+    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera", left_out);
     if (std::holds_alternative<LightCamera>(spec)) return camera;
 
     // A pinhole will do if it is the light's own view: same place, same axes to within a ten-thousandth.

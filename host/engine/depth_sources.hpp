@@ -9,13 +9,7 @@
 
 namespace penumbra {
 
-// What the light's view of what casts need not hold: objects that do not cast, and ground.
-struct LeftOut {
-    std::vector<bool> objects; // one an object; empty: none
-    std::vector<Ground> grounds;
-};
-
-// For these receivers; null: they are not known, and ground stays, as something behind it may be shaded later. Nothing where the technique needs the
+// What the light's view of what casts need not hold for these receivers; null: they are not known, and ground stays, as something behind it may be shaded later. Nothing where the technique needs the
 // whole view, or traces rays.
 LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, const Needs& needs, const Receivers* receivers);
 

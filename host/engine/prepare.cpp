@@ -53,12 +53,11 @@ bool inside_view(const Imath::Box3d& box, const Camera& view)
     return true;
 }
 
-// Whether every triangle before the light's plane lies inside the light's view, of objects that are not left out.
+// Whether every triangle before the light's plane lies inside the light's view, but for ground that is left out.
 bool casters_inside(const std::vector<Object>& objects, const Camera& view, const LeftOut& left_out)
 {
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        const Object& object = objects[i];
-        if (!object.casts || (!left_out.objects.empty() && left_out.objects[i])) continue;
+    for (const Object& object : objects) {
+        if (!object.casts) continue;
         if (object.seen) return false; // its pixels are many, and counting receivers costs nothing
         if (inside_view(bounds(object.mesh), view)) continue;
         for (const auto& triangle : object.mesh.triangles) {
@@ -68,7 +67,7 @@ bool casters_inside(const std::vector<Object>& objects, const Camera& view, cons
                 before += p.depth > 0;
                 inside += inside_view(p);
             }
-            if (before > 0 && inside < 3) return false;
+            if (before > 0 && inside < 3 && !in_ground(left_out.grounds, object.mesh, triangle)) return false;
         }
     }
     return true;
@@ -115,11 +114,10 @@ LightDepth depth_of(const Light& light, const Occluders& occluders, const std::v
 std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry, const LeftOut& left_out)
 {
     std::vector<const TriangleMesh*> meshes, all;
-    for (std::size_t i = 0; i < geometry.objects().size(); ++i) {
-        const Object& object = geometry.objects()[i];
+    for (const Object& object : geometry.objects()) {
         if (!object.casts || object.seen) continue;
         all.push_back(&object.mesh);
-        if (left_out.objects.empty() || !left_out.objects[i]) meshes.push_back(&object.mesh);
+        if (!in_ground(left_out.grounds, object.mesh)) meshes.push_back(&object.mesh);
     }
     return meshes.empty() ? all : meshes;
 }

@@ -8,8 +8,6 @@
 
 #include <penumbra/error.hpp>
 
-#include "scene/ground.hpp"
-
 namespace penumbra {
 namespace {
 
@@ -104,9 +102,10 @@ void add_seen(LightBox& result, const LightFrame& light, const SeenSurface& seen
 // What reaches through the light's plane spans any field of view: its tangents count up to this.
 constexpr double widest = 8;
 
-void add_mesh(LightBox& result, const LightFrame& light, const Object& object)
+void add_mesh(LightBox& result, const LightFrame& light, const Object& object, const std::vector<Ground>& grounds)
 {
     for (const auto& triangle : object.mesh.triangles) {
+        if (in_ground(grounds, object.mesh, triangle)) continue;
         Vec3 corner[3];
         int before = 0;
         for (int i = 0; i < 3; ++i) {
@@ -126,28 +125,18 @@ void add_mesh(LightBox& result, const LightFrame& light, const Object& object)
     }
 }
 
-LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out)
+LightBox light_box(const LightFrame& light, const std::vector<Object>& objects, const LeftOut& left_out)
 {
     LightBox result;
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        const Object& object = objects[i];
-        if ((!object.casts && !object.receives) || (!left_out.empty() && left_out[i])) continue;
+    for (const Object& object : objects) {
+        if ((!object.casts && !object.receives) || left_out.holds(object)) continue;
         if (object.seen) add_seen(result, light, *object.seen);
-        add_mesh(result, light, object);
+        add_mesh(result, light, object, left_out.grounds);
     }
     return result;
 }
 
 bool is_empty(const LightBox& fit) { return fit.tangent.x == 0 && fit.tangent.y == 0; }
-
-// What may be left out where something reaches through the light's plane: ground, and what does not cast.
-std::vector<bool> all_but_casters(const LightFrame& light, const std::vector<Object>& objects)
-{
-    std::vector<bool> left_out;
-    for (const Object& object : objects) left_out.push_back(!object.casts);
-    for (const Ground& ground : grounds_of(light, objects)) left_out[ground.object] = true;
-    return left_out;
-}
 
 // One texel wider on every side, so that what lies on the border is inside; never flat.
 Vec2 with_margin(const Vec2& half, int width, int height)
@@ -157,7 +146,7 @@ Vec2 with_margin(const Vec2& half, int width, int height)
     return {wide.x * (1 + 2.0 / width), wide.y * (1 + 2.0 / height)};
 }
 
-Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out,
+Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const LeftOut& left_out,
                int width, int height, std::string_view where)
 {
     const LightBox whole = light_box(light, objects, {}), part = light_box(light, objects, left_out);
@@ -186,7 +175,7 @@ Camera fit_sun(const LightCamera& spec, const LightFrame& light, const std::vect
     return light_camera(light, half, center);
 }
 
-Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const std::vector<bool>& left_out,
+Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::vector<Object>& objects, const LeftOut& left_out,
                  int width, int height, std::string_view where)
 {
     if (spec.tan_half_fov) return light_camera(light, *spec.tan_half_fov, light.origin);
@@ -195,7 +184,7 @@ Camera fit_light(const LightCamera& spec, const LightFrame& light, const std::ve
     LightBox fit = light_box(light, objects, left_out);
     if (is_empty(fit)) fit = light_box(light, objects, {});
     if (fit.crosses) {
-        const LightBox less = light_box(light, objects, all_but_casters(light, objects));
+        const LightBox less = light_box(light, objects, {.receivers = true, .grounds = grounds_of(light, objects)});
         if (!is_empty(less)) fit = less;
     }
     if (is_empty(fit))
@@ -214,7 +203,7 @@ Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3
 }
 
 Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
-                      std::string_view where, const std::vector<bool>& left_out)
+                      std::string_view where, const LeftOut& left_out)
 {
     Camera camera;
     if (const auto* pinhole = std::get_if<PinholeCamera>(&spec)) {

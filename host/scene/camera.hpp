@@ -5,18 +5,27 @@
 
 #include <penumbra/scene.hpp>
 
+#include "scene/ground.hpp"
 #include "scene/light_space.hpp"
 
 namespace penumbra {
 
+// What a light's view need not hold: objects that do not cast, and ground.
+struct LeftOut {
+    bool receivers = false;
+    std::vector<Ground> grounds = {};
+
+    bool holds(const Object& object) const { return receivers && !object.casts; }
+};
+
 // The camera of the light, looking along its direction, image x along u, image up along v.
 Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3& center);
 
-// Makes a camera ready. A light's camera with parts left out is fitted to the objects that cast or receive, but those that `left_out` names (one a
-// object, or empty), as long as others are left; throws invalid_input ("<where>.tan_half_fov: ...") when there is nothing to fit to, or when
+// Makes a camera ready. A light's camera with parts left out is fitted to the objects that cast or receive, but for what is left
+// out, as long as others are left; throws invalid_input ("<where>.tan_half_fov: ...") when there is nothing to fit to, or when
 // objects lie at or behind the light's plane all round.
 Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
-                      std::string_view where, const std::vector<bool>& left_out = {});
+                      std::string_view where, const LeftOut& left_out = {});
 
 // Throws invalid_input for a frame that is not orthonormal and right-handed (1e-4) or fields of view that are not positive and finite.
 void validate(const Camera& camera, std::string_view where);

@@ -3,35 +3,46 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <map>
 
 #include "scene/camera.hpp"
 
 namespace penumbra {
 namespace {
 
-// A plane: points where normal . p = offset.
-struct Plane {
-    Vec3 normal{0, 0, 0};
-    double offset = 0;
-};
+// How far a point may lie from a plane and still be in it.
+double tolerance_at(const Vec3& p) { return 1e-5 * (1 + p.length()); }
 
-// The plane that a mesh lies in, to a hundred-thousandth of its size; nothing when it lies in none.
-std::optional<Plane> plane_of(const TriangleMesh& mesh)
+// Planes of a mesh's triangles, those of most area first. A few are enough: what is not found to be ground is held in the view.
+constexpr std::size_t most_planes = 8;
+std::vector<Ground> planes_of(const TriangleMesh& mesh)
 {
-    if (mesh.triangles.empty()) return {};
-    Vec3 normal(0, 0, 0);
+    struct Plane {
+        double area = 0, largest = 0;
+        Ground ground{};
+    };
+    // Triangles of one plane fall into one bin, or into two beside each other.
+    const double size = std::max((bounds(mesh).max - bounds(mesh).min).length(), 1e-30);
+    std::map<std::array<long, 4>, Plane> bins;
     for (const auto& [a, b, c] : mesh.triangles) {
-        const Vec3 n = (Vec3(mesh.positions[b]) - Vec3(mesh.positions[a])).cross(Vec3(mesh.positions[c]) - Vec3(mesh.positions[a]));
-        if (n.length() > normal.length()) normal = n;
+        const Vec3 at(mesh.positions[a]), cross = (Vec3(mesh.positions[b]) - at).cross(Vec3(mesh.positions[c]) - at);
+        const double area = cross.length();
+        if (!(area > 0) || !std::isfinite(area)) continue;
+        Vec3 normal = cross / area;
+        // Either way round.
+        const double main = std::abs(normal.x) > .5 ? normal.x : std::abs(normal.y) > .5 ? normal.y : normal.z;
+        if (main < 0) normal = -normal;
+        const double offset = normal.dot(at);
+        Plane& plane = bins[{std::lround(normal.x * 1024), std::lround(normal.y * 1024), std::lround(normal.z * 1024), std::lround(offset / size * 1024)}];
+        plane.area += area;
+        if (area > plane.largest) plane = {plane.area, area, {normal, offset}};
     }
-    if (!(normal.length() > 0)) return {};
-    Plane plane{normal.normalized(), 0};
-    plane.offset = plane.normal.dot(Vec3(mesh.positions[mesh.triangles.front()[0]]));
-    const double tolerance = 1e-5 * (bounds(mesh).max - bounds(mesh).min).length();
-    for (const Imath::V3f& p : mesh.positions)
-        if (std::abs(plane.normal.dot(Vec3(p)) - plane.offset) > tolerance) return {};
-    return plane;
+    std::vector<Plane> sorted;
+    for (const auto& [key, plane] : bins) sorted.push_back(plane);
+    std::stable_sort(sorted.begin(), sorted.end(), [](const Plane& a, const Plane& b) { return a.area > b.area; });
+    std::vector<Ground> planes;
+    for (std::size_t i = 0; i < std::min(sorted.size(), most_planes); ++i) planes.push_back(sorted[i].ground);
+    return planes;
 }
 
 // Whether all of the light is strictly before the plane: a light that reaches through it is hidden by it in part.
@@ -69,7 +80,7 @@ bool shows_behind(const Ground& ground, const DepthMap& depth, const Camera& cam
 
 bool all_before(const Object& object, const Ground& ground)
 {
-    const auto before = [&](const Vec3& p) { return ground.normal.dot(p) - ground.offset >= -1e-5 * (1 + p.length()); };
+    const auto before = [&](const Vec3& p) { return ground.normal.dot(p) - ground.offset >= -tolerance_at(p); };
     for (const Imath::V3f& p : object.mesh.positions)
         if (!before(Vec3(p))) return false;
     return !object.seen || !shows_behind(ground, object.seen->depth, object.seen->camera);
@@ -80,17 +91,29 @@ bool all_before(const Object& object, const Ground& ground)
 std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object>& objects)
 {
     std::vector<Ground> grounds;
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        if (objects[i].seen) continue;
-        const auto plane = plane_of(objects[i].mesh);
-        if (!plane) continue;
-        const double height = light.directional ? -plane->normal.dot(light.direction) : plane->normal.dot(light.origin) - plane->offset;
-        const Ground ground = height > 0 ? Ground{i, plane->normal, plane->offset} : Ground{i, -plane->normal, -plane->offset};
-        if (!whole_light_before(light, ground)) continue;
-        const bool lowest = std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return &other == &objects[i] || all_before(other, ground); });
-        if (lowest) grounds.push_back(ground);
-    }
+    for (const Object& object : objects)
+        for (const Ground& plane : planes_of(object.mesh)) {
+            const double height = light.directional ? -plane.normal.dot(light.direction) : plane.normal.dot(light.origin) - plane.offset;
+            const Ground ground = height > 0 ? plane : Ground{-plane.normal, -plane.offset};
+            if (!whole_light_before(light, ground)) continue;
+            if (std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other, ground); })) grounds.push_back(ground);
+        }
     return grounds;
+}
+
+bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle)
+{
+    return std::any_of(grounds.begin(), grounds.end(), [&](const Ground& ground) {
+        return std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
+            const Vec3 p(mesh.positions[corner]);
+            return std::abs(ground.normal.dot(p) - ground.offset) <= tolerance_at(p);
+        });
+    });
+}
+
+bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh)
+{
+    return !grounds.empty() && std::all_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& triangle) { return in_ground(grounds, mesh, triangle); });
 }
 
 bool shows_behind(const std::vector<Ground>& grounds, const DepthMap& depth, const Camera& camera)

@@ -1,7 +1,7 @@
-// Ground: flat objects that cast on nothing, because all there is lies on the light's side of them. A light's view need not hold them.
+// Ground: planes of triangles that cast on nothing, because all there is lies on the light's side of them. A light's view need not hold them.
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <vector>
 
 #include <penumbra/scene.hpp>
@@ -12,13 +12,16 @@ namespace penumbra {
 
 // Points where normal . p >= offset are on the light's side.
 struct Ground {
-    std::size_t object; // its place in the list
     Vec3 normal;
     double offset;
 };
 
-// The objects that lie in one plane with the whole light and every other object on one side of it (to a hundred-thousandth).
+// The planes with the whole light and every object on one side of them (to a hundred-thousandth), among those in which a mesh has most of its area.
 std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object>& objects);
+
+// Whether the triangle, or every triangle of the mesh, lies in one of the grounds.
+bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle);
+bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh);
 
 // Whether a depth image shows something on the far side of a ground, which could then cast on it: more than 2 in 1000 of its points lie behind by
 // 3 % of their depth, or any by 10 %. Nearer than that they may be the ground itself, as a noisy image shows it.

@@ -22,10 +22,13 @@ const Object floor_quad = quad({0, 0, 0}, {5, 0, 0}, {0, 0, -5});
 const Object wall = quad({0, 2, -5}, {5, 0, 0}, {0, 2, 0});
 const Object table = quad({0, 1, 0}, {1, 0, 0}, {0, 0, -1});
 
+// The objects all of whose triangles lie in ground.
 std::vector<std::size_t> ground(const Light& light, const std::vector<Object>& objects)
 {
+    const std::vector<Ground> grounds = grounds_of(light_frame(light), objects);
     std::vector<std::size_t> found;
-    for (const Ground& one : grounds_of(light_frame(light), objects)) found.push_back(one.object);
+    for (std::size_t i = 0; i < objects.size(); ++i)
+        if (in_ground(grounds, objects[i].mesh)) found.push_back(i);
     return found;
 }
 
@@ -55,6 +58,30 @@ TEST(Ground, TheWholeLightIsBeforeIt)
     EXPECT_EQ(ground(standing(.9), {floor_quad, wall}), Places{1});
     const DirectionalLight low{.direction = {1, -.05, 0}, .angular_diameter_deg = 10, .up = {}};
     EXPECT_EQ(ground(low, {floor_quad, table}), Places{}) << "half of this sun is below the horizon";
+}
+
+// A floor of many triangles and what stands on it, in one mesh.
+TEST(Ground, IsFoundWithinAMesh)
+{
+    Object both{.name = "both", .mesh = table.mesh};
+    constexpr int side = 20;
+    for (int z = 0; z <= side; ++z)
+        for (int x = 0; x <= side; ++x) both.mesh.positions.emplace_back(Vec3(x - side / 2., 0, z - side / 2.));
+    for (std::uint32_t z = 0; z < side; ++z)
+        for (std::uint32_t x = 0; x < side; ++x) {
+            const std::uint32_t a = 4 + z * (side + 1) + x;
+            both.mesh.triangles.push_back({a, a + 1, a + side + 1});
+            both.mesh.triangles.push_back({a + 1, a + side + 1, a + side + 2}); // the other way round
+        }
+    const std::vector<Ground> grounds = grounds_of(light_frame(lamp({0, 4, 2}, .5)), {both});
+    ASSERT_EQ(grounds.size(), 1u);
+    EXPECT_FALSE(in_ground(grounds, both.mesh));
+    int inside = 0;
+    for (const auto& triangle : both.mesh.triangles) inside += in_ground(grounds, both.mesh, triangle);
+    EXPECT_EQ(inside, 2 * side * side);
+
+    const Camera camera = resolve_camera(LightCamera{}, lamp({0, 4, 0}, .5), {both}, 64, 64, "occluders.camera", {.receivers = true, .grounds = grounds});
+    EXPECT_NEAR(camera.half_extent.x, 1. / 3 * (1 + 2. / 64), 1e-6) << "the table alone";
 }
 
 TEST(Ground, BodiesAreNone)
