@@ -29,6 +29,8 @@ struct Flags {
     TechniqueFlags technique;
 };
 
+const OutputFormat bound_format{.format = "exr", .bits = 32, .channels = {"low", "high"}};
+
 constexpr const char* examples = R"(
 Examples:
   penumbra mask scene.json -o mask.exr
@@ -54,22 +56,27 @@ void write_report(const Flags& flags, const std::string& report)
 int run_on_server(const Flags& flags, const std::vector<MaskFile>& files)
 {
     if (!flags.device.empty()) throw Error(ErrorCode::usage, "--device " + flags.device + ": with --server, the server has the device");
-    const std::string report = masks_on_server({flags.server, flags.scene, flags.technique}, files, !flags.report.empty());
+    RemoteScene asked{.server = flags.server, .scene = flags.scene, .technique = flags.technique, .over = flags.over, .picture = {}};
+    if (!flags.over.empty()) asked.picture = read_picture(flags.over);
+    const std::string report = masks_on_server(asked, files, !flags.report.empty());
     if (!flags.report.empty()) write_report(flags, report);
     return 0;
 }
 
 // The other files that are written, of each mask: none may replace another, or what is read.
-void check_further_files(const Flags& flags, const nlohmann::json& json, const std::vector<MaskFile>& masks)
+void add_further_files(const Flags& flags, const nlohmann::json& json, std::vector<MaskFile>& masks)
 {
     std::vector<std::pair<std::string, const char*>> written;
-    for (const auto& [name, flag] : {std::pair(flags.bound, "--bound"), std::pair(flags.preview, "--preview")}) {
-        if (name.empty()) continue;
+    const auto add = [&](const std::string& name, const char* flag, std::string MaskFile::*member) {
+        if (name.empty()) return;
+        const std::vector<MaskFile> named = mask_files(name, json, flags.choice);
         std::vector<std::string> files;
-        for (const MaskFile& file : mask_files(name, json, flags.choice)) files.push_back(file.file);
+        for (std::size_t i = 0; i < masks.size(); ++i) files.push_back(masks[i].*member = named[i].file);
         require_not_named_in(flags.scene, json, files, flag);
         for (const std::string& file : files) written.emplace_back(file, flag);
-    }
+    };
+    add(flags.bound, "--bound", &MaskFile::bound);
+    add(flags.preview, "--preview", &MaskFile::preview);
     for (const MaskFile& mask : masks) {
         if (!flags.over.empty()) require_different(mask.file, "-o", flags.over, "--over");
         for (const auto& [file, flag] : written) require_different(file, flag, mask.file, "-o");
@@ -116,7 +123,7 @@ std::vector<MaskFile> check_files(const Flags& flags)
         if (!flags.report.empty()) require_different(flags.report, "--report", file.file, "-o");
     }
     require_not_named_in(flags.scene, json, paths, "-o");
-    check_further_files(flags, json, files);
+    add_further_files(flags, json, files);
     return files;
 }
 
@@ -131,10 +138,6 @@ int run(const Flags& flags)
 {
     // Refuse in order of cost: names, then the scene, then the device, then the work.
     const std::vector<MaskFile> files = check_files(flags);
-    if (!flags.server.empty() && !flags.preview.empty())
-        throw Error(ErrorCode::usage, "--preview " + flags.preview + ": does not go with --server");
-    if (!flags.server.empty() && !flags.bound.empty())
-        throw Error(ErrorCode::usage, "--bound " + flags.bound + ": does not go with --server", "compute it here, without --server");
     if (!flags.server.empty()) return run_on_server(flags, files);
 
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
@@ -157,6 +160,7 @@ int run(const Flags& flags)
     if (!flags.over.empty()) {
         progress.step("reading " + flags.over);
         picture = read_picture(flags.over);
+        require_size(picture, scene.receivers.width, scene.receivers.height, flags.over);
     }
     std::vector<FileReport> reports;
     std::vector<std::string> warnings;
@@ -168,12 +172,12 @@ int run(const Flags& flags)
         if (!flags.preview.empty()) {
             const std::string preview = mask_file(flags.preview, named.light, named.frame);
             progress.step("writing " + preview);
-            write_image(preview, under_light(picture, named.mask.visibility, flags.over), {.format = "png", .bits = 8});
+            write_image(preview, under_light(picture, named.mask.visibility, flags.over), preview_format);
         }
         if (!flags.bound.empty()) {
             const std::string bound = mask_file(flags.bound, named.light, named.frame);
             progress.step("writing " + bound);
-            write_image(bound, named.mask.bound, {.format = "exr", .bits = 32, .channels = {"low", "high"}});
+            write_image(bound, named.mask.bound, bound_format);
         }
         // Those of each light come again, with its name, from all lights together.
         if (named.light.empty())

@@ -17,11 +17,12 @@ struct MaskChoice {
     int frame = 0;
 };
 
-// One of the masks of a scene, and its file.
+// One of the masks of a scene, and its files.
 struct MaskFile {
     std::string light; // empty: all together, or the only one
     int frame = 0;     // 0: there is no sequence
     std::string file;
+    std::string bound = {}, preview = {}; // of --bound and --preview; empty: not wanted
 };
 
 // `out.exr`, with `.<light>` and `.<frame>` (four digits) before its extension where they are given.

@@ -12,14 +12,20 @@ namespace {
 float linear(float encoded) { return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f); }
 float encoded(float linear) { return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f; }
 
-std::string size_of(const Image& image) { return std::to_string(image.width) + " x " + std::to_string(image.height); }
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 } // namespace
 
+void require_size(const Image& picture, int width, int height, const std::string& name)
+{
+    if (picture.width != width || picture.height != height)
+        throw Error(ErrorCode::usage, "--over " + name + ": is " + size_text(picture.width, picture.height),
+                    "expected " + size_text(width, height) + ", the mask's size");
+}
+
 Image under_light(const Image& picture, const Image& mask, const std::string& name)
 {
-    if (picture.width != mask.width || picture.height != mask.height)
-        throw Error(ErrorCode::usage, "--over " + name + ": is " + size_of(picture), "expected " + size_of(mask) + ", the mask's size");
+    require_size(picture, mask.width, mask.height, name);
     Image result{.width = picture.width, .height = picture.height, .channels = 3, .pixels = {}};
     result.pixels.reserve(result.pixel_count() * 3);
     for (int y = 0; y < picture.height; ++y)

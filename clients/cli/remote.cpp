@@ -16,6 +16,7 @@
 #include "io/image_io.hpp"
 #include "io/json_value.hpp"
 #include "io/scene_parts.hpp"
+#include "preview.hpp"
 #include "progress.hpp"
 #include "streams.hpp"
 
@@ -110,15 +111,26 @@ nlohmann::ordered_json report_of(const client::Mask& mask, const client::Client&
     return report;
 }
 
-// One mask, written; its report.
+// One mask with its bound and its preview, written; its report.
 nlohmann::ordered_json fetch(const client::Client& service, const client::SceneFile& scene, const RemoteScene& asked, const MaskFile& file,
                              bool with_report, std::vector<std::string>& warnings)
 {
+    // The bound first: a technique may have none.
+    client::Mask bound;
+    if (!file.bound.empty())
+        bound = service.mask(scene.scene, scene.images,
+                             {.format = client::Format::exr, .light = file.light, .frame = file.frame, .image = client::MaskImage::bound});
     const auto begun = std::chrono::steady_clock::now();
     const client::Mask mask =
         service.mask(scene.scene, scene.images, {.format = format_of_mask(file.file), .light = file.light, .frame = file.frame});
     const double round_trip_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count();
+    Image preview;
+    if (!file.preview.empty())
+        preview = under_light(asked.picture, decode_image(std::as_bytes(std::span(mask.bytes)), file.file), asked.over);
+
     write_file(file.file, std::as_bytes(std::span(mask.bytes)));
+    if (!file.preview.empty()) write_image(file.preview, preview, preview_format);
+    if (!file.bound.empty()) write_file(file.bound, std::as_bytes(std::span(bound.bytes)));
     for (const std::string& warning : mask.warnings)
         if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
     return with_report ? report_of(mask, service, scene.scene, asked, file, round_trip_ms) : nlohmann::ordered_json();

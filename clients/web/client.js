@@ -5,7 +5,8 @@
 /** @typedef {Map<string, Blob>} Files the images that a scene names */
 /** @typedef {{name: string, ms: number}} Stage */
 /** @typedef {{buffer: ArrayBuffer, stages: Stage[], warnings: string[], ms: number}} MaskReply */
-/** @typedef {{kind: string, summary: string, lights: string[], inputs: string, source: string, schema: Json}} Technique */
+/** @typedef {"mask" | "bound"} MaskImage a mask, or its lowest and highest visibility, which comes as EXR only */
+/** @typedef {{kind: string, summary: string, lights: string[], inputs: string, source: string, bounds: boolean, schema: Json}} Technique */
 
 /** The sections that differ from one request to the next of a kept scene. */
 const CHANGEABLE = ["light", "technique", "output"];
@@ -53,6 +54,8 @@ function form_of(scene, files) {
   return form;
 }
 
+const query_of = (/** @type {MaskImage} */ image) => (image === "mask" ? "" : `?image=${image}`);
+
 /** The merge patch (RFC 7396) from a kept scene to `scene`. Members merge where the kind is the same, so what is at its default now is taken
  * out; another kind replaces the object.
  * @param {Json} scene @param {Json} kept technique of the kept scene */
@@ -68,7 +71,8 @@ export class Client {
   token = "";
   /** False once the service has said that it keeps no scenes. */
   keeps = true;
-  /** What is kept, by content, and the technique that it was sent with. @type {Map<string, {id: string, technique: Json}>} */
+  /** What is kept, by content, and the technique that it was sent with: promised while it is on its way.
+   * @type {Map<string, Promise<{id: string, technique: Json} | null>>} */
   #kept = new Map();
   /** @type {WeakMap<Blob, number>} */
   #numbers = new WeakMap();
@@ -95,21 +99,22 @@ export class Client {
   }
 
   /** The mask of a scene that more requests will follow of.
-   * @param {Json} scene @param {Files} files @param {string} accept media type */
-  mask(scene, files, accept) {
-    return this.#timed(() => this.#post_kept(scene, files, accept));
+   * @param {Json} scene @param {Files} files @param {string} accept media type @param {MaskImage} [image] */
+  mask(scene, files, accept, image = "mask") {
+    return this.#timed((begins) => this.#post_kept(scene, files, accept, query_of(image), begins));
   }
 
   /** The mask of a scene that is asked for once.
-   * @param {Json} scene @param {Files} files @param {string} accept media type */
-  mask_once(scene, files, accept) {
-    return this.#timed(() => this.#post_whole(scene, files, accept));
+   * @param {Json} scene @param {Files} files @param {string} accept media type @param {MaskImage} [image] */
+  mask_once(scene, files, accept, image = "mask") {
+    return this.#timed(() => this.#post_whole(scene, files, accept, query_of(image)));
   }
 
-  /** @param {() => Promise<Response>} post @returns {Promise<MaskReply>} */
+  /** `post` may say when the mask itself is asked for: keeping the scene does not count.
+   * @param {(begins: () => void) => Promise<Response>} post @returns {Promise<MaskReply>} */
   async #timed(post) {
-    const begun = performance.now();
-    const response = await post();
+    let begun = performance.now();
+    const response = await post(() => (begun = performance.now()));
     const buffer = await response.arrayBuffer();
     return {
       buffer,
@@ -119,45 +124,54 @@ export class Client {
     };
   }
 
-  /** @param {Json} scene @param {Files} files @param {string} accept */
-  #post_whole(scene, files, accept) {
-    return this.#fetch("/v1/masks", { method: "POST", body: form_of(scene, files), headers: { Accept: accept } });
+  /** @param {Json} scene @param {Files} files @param {string} accept @param {string} query */
+  #post_whole(scene, files, accept, query) {
+    return this.#fetch(`/v1/masks${query}`, { method: "POST", body: form_of(scene, files), headers: { Accept: accept } });
   }
 
-  /** @param {Json} scene @param {Files} files @param {string} accept */
-  async #post_kept(scene, files, accept) {
+  /** @param {Json} scene @param {Files} files @param {string} accept @param {string} query @param {() => void} begins */
+  async #post_kept(scene, files, accept, query, begins) {
     const kept = this.keeps ? await this.#keep(scene, files) : null;
-    if (!kept) return this.#post_whole(scene, files, accept);
-    const change = (/** @type {{id: string, technique: Json}} */ { id, technique }) =>
-      this.#fetch(`/v1/scenes/${id}/masks`, {
+    if (!kept) return this.#post_whole(scene, files, accept, query);
+    const change = (/** @type {{id: string, technique: Json}} */ { id, technique }) => {
+      begins();
+      return this.#fetch(`/v1/scenes/${id}/masks${query}`, {
         method: "POST",
         body: JSON.stringify(patch_of(scene, technique)),
         headers: { Accept: accept, "Content-Type": "application/merge-patch+json" },
       });
+    };
     try {
       return await change(kept);
     } catch (error) {
       if (!(error instanceof ServiceError && error.status === 404)) throw error;
-      // Its time was over: send it again.
-      this.#kept.delete(this.#key(scene, files));
+      // Its time was over: send it again, once for all who wait.
+      const key = this.#key(scene, files);
+      if ((await this.#kept.get(key)) === kept) this.#kept.delete(key);
       const again = await this.#keep(scene, files);
-      return again ? change(again) : this.#post_whole(scene, files, accept);
+      return again ? change(again) : this.#post_whole(scene, files, accept, query);
     }
   }
 
   /** The kept scene; null when the service keeps none.
    * @param {Json} scene @param {Files} files */
-  async #keep(scene, files) {
+  #keep(scene, files) {
     const key = this.#key(scene, files);
     const known = this.#kept.get(key);
     if (known) return known;
+    const sent = this.#send(scene, files);
+    this.#kept.set(key, sent);
+    sent.catch(() => this.#kept.delete(key));
+    return sent;
+  }
+
+  /** @param {Json} scene @param {Files} files @returns {Promise<{id: string, technique: Json} | null>} */
+  async #send(scene, files) {
     try {
       const { id } = await (await this.#fetch("/v1/scenes", { method: "POST", body: form_of(scene, files) })).json();
-      const kept = { id: /** @type {string} */ (id), technique: scene.technique };
-      this.#kept.set(key, kept);
-      return kept;
+      return { id, technique: scene.technique };
     } catch (error) {
-      if (!(error instanceof ServiceError && (error.status === 404 || error.status === 405))) throw error;
+      if (!(error instanceof ServiceError && (error.status === 404 || error.status === 405 || error.reason === "no_scenes"))) throw error;
       this.keeps = false;
       return null;
     }

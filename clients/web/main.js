@@ -1,5 +1,5 @@
 // @ts-check
-// The page: one state, one queue of requests, and the panels that change the one and show the other.
+// The page: one state, a queue of requests that follows it and one for slow masks, and the panels that change the state and show the masks.
 import { draw_casters } from "./casters.js";
 import { Client, ServiceError } from "./client.js";
 import { choice_field } from "./fields.js";
@@ -7,14 +7,17 @@ import { error_table, stage_table } from "./figures.js";
 import { LightPanel } from "./light_panel.js";
 import { compare } from "./metrics.js";
 import { decode_pfm } from "./pfm.js";
+import { Orbit } from "./orbit.js";
+import { choose_picture, show_picture_choice } from "./picture_choice.js";
 import { median_depth } from "./probe.js";
 import { LatestQueue } from "./queue.js";
 import { RateMeter } from "./rate.js";
 import { courtyard_source, scene_json } from "./scene.js";
 import { save, SharePanel } from "./share_panel.js";
 import { SourcePanel } from "./source_panel.js";
-import { suggested_choice, technique_panel } from "./technique_panel.js";
+import { draft_of, suggested_choice, technique_panel } from "./technique_panel.js";
 import { View } from "./view.js";
+import { wire_wipe } from "./wipe.js";
 
 /** @typedef {import("./scene.js").Source} Source */
 /** @typedef {import("./technique_panel.js").Choice} Choice */
@@ -23,7 +26,8 @@ import { View } from "./view.js";
 const PFM = "image/x-portable-floatmap";
 /** What the page opens with, where the service knows it; else the service's first. */
 const FIRST = { a: "soft_shadow_map", b: "ray_traced" };
-/** The second mask follows the light at once when it takes less than this; else when the light has rested that long. */
+/** The second mask follows the light at once when it takes less than this; else, as a mask that was drafted, when the light has rested that
+ * long. */
 const FOLLOWS_MS = 150;
 /** Tables follow a moving light this often: nobody reads them faster. */
 const FIGURES_MS = 250;
@@ -34,6 +38,8 @@ const by_id = (/** @type {string} */ id) => /** @type {any} */ (document.getElem
 
 const client = new Client();
 const queue = new LatestQueue();
+/** What takes long, while a draft or a first mask is shown: a light that moves again does not wait for it. */
+const slow_queue = new LatestQueue();
 const view = new View(by_id("mask"));
 const rate = new RateMeter();
 /** @type {import("./client.js").Technique[]} */
@@ -47,8 +53,10 @@ let a = { kind: FIRST.a, settings: {} };
 let b = { kind: FIRST.b, settings: {} };
 /** Counts changes: a mask belongs to one. */
 let version = 0;
-/** @type {{a: MaskReply | null, b: MaskReply | null, b_version: number}} */
-const shown = { a: null, b: null, b_version: -1 };
+/** `draft` is the technique that stands in for A's. @type {{a: MaskReply | null, a_version: number, draft: Choice | null, b: MaskReply | null, b_version: number}} */
+const shown = { a: null, a_version: -1, draft: null, b: null, b_version: -1 };
+/** How long the last draft and the last mask in full took, from asking for them to the last byte. */
+const taken_ms = { draft: 0, full: Infinity };
 let rest_timer = 0, figures_timer = 0;
 
 let said_timer = 0;
@@ -81,35 +89,50 @@ function waits(error, again) {
   return true;
 }
 
-async function update_a() {
+/** The technique that may stand in for A's while the light moves; null: A's own does. */
+const draft_choice = () => (by_id("draft").checked ? draft_of(techniques, a, source, light.kind) : null);
+/** That technique, unless A's own is as quick here. */
+const draft_now = () => (taken_ms.full > taken_ms.draft ? draft_choice() : null);
+
+/** @param {Choice | null} draft */
+async function update_a(draft) {
   const asked = version;
+  const choice = draft ?? a;
   try {
-    const reply = await ask(a);
+    const reply = await ask(choice);
+    // The light has gone on, and its draft is there already.
+    if (shown.a_version > asked) return;
+    taken_ms[draft ? "draft" : "full"] = reply.ms;
     view.a = decode_pfm(reply.buffer);
-    shown.a = reply;
+    Object.assign(shown, { a: reply, a_version: asked, draft });
     by_id("problem").hidden = true;
     by_id("rate").textContent = rate.tick(performance.now());
-    // Announced to scripts and tests: this version of the state is on the screen.
+    // Announced to scripts and tests: this version of the state is on the screen, as a draft or in full.
     by_id("mask").dataset.version = String(asked);
+    by_id("mask").dataset.technique = choice.kind;
   } catch (error) {
-    if (waits(error, update)) return;
-    shown.a = null;
-    fail(error);
+    if (shown.a_version > asked) return;
+    if (waits(error, () => update(draft !== null))) return;
+    // A draft stays in sight: it is right for what it is.
+    const drafted = !draft && shown.draft !== null;
+    Object.assign(shown, drafted ? { a_version: asked } : { a: null, a_version: asked, draft });
+    fail(error, drafted ? `${choice.kind}: ` : "");
   }
   show_masks();
-  if (view.mode !== "mask" && shown.b && shown.b.ms < FOLLOWS_MS && asked === version) await update_b();
+  if (!draft && view.mode !== "mask" && shown.b && shown.b.ms < FOLLOWS_MS && asked === version) await update_b();
 }
 
 async function update_b() {
   const asked = version;
   try {
     const reply = await ask(b);
+    if (shown.b_version > asked) return;
     view.b = decode_pfm(reply.buffer);
     shown.b = reply;
     shown.b_version = asked;
     by_id("mask").dataset.versionB = String(asked);
   } catch (error) {
-    if (waits(error, update)) return;
+    if (waits(error, () => update())) return;
     view.b = null;
     shown.b = null;
     fail(error, `${b.kind}: `);
@@ -117,19 +140,28 @@ async function update_b() {
   show_masks();
 }
 
-/** Asks for masks of the state as it is now. */
-function update() {
+/** What is missing when the light rests: A in full, and B. @param {number} asked the version that rested */
+async function complete(asked) {
+  if (asked !== version) return;
+  if (shown.draft || shown.a_version !== version) await update_a(null);
+  // Without a first mask there is nothing to compare with, and its error is what the user should read.
+  if (view.mode !== "mask" && asked === version && shown.b_version !== version && shown.a) await update_b();
+}
+
+/** Asks for masks of the state as it is now. @param {boolean} [light_moved] whether the light alone has changed, or all is new: a draft does first */
+function update(light_moved = false) {
   version++;
-  queue.push(update_a);
+  const draft = draft_now();
+  if (draft && !light_moved) slow_queue.push(() => update_a(null));
+  else queue.push(() => update_a(draft));
   share.refresh();
   clearTimeout(rest_timer);
-  if (view.mode === "mask") return;
+  if (view.mode === "mask" && !draft) return;
   const asked = version;
   const when_rested = () => {
-    // Without a first mask there is nothing to compare with, and its error is what the user should read.
-    if (asked !== version || shown.b_version === version || (shown.a === null && !queue.busy)) return;
+    if (asked !== version) return;
     if (queue.busy) rest_timer = setTimeout(when_rested, FOLLOWS_MS);
-    else queue.push(update_b);
+    else slow_queue.push(() => complete(asked));
   };
   rest_timer = setTimeout(when_rested, FOLLOWS_MS);
 }
@@ -142,14 +174,25 @@ function show_masks() {
   const comparing = view.mode !== "mask";
   const stale = shown.b_version !== version;
   frame.classList.toggle("failed", shown.a === null);
-  by_id("name_a").hidden = by_id("name_b").hidden = !comparing;
-  by_id("name_a").textContent = `A  ${a.kind}`;
+  const drafted = shown.draft !== null;
+  by_id("name_b").hidden = !comparing;
+  by_id("name_a").hidden = !comparing && draft_choice() === null && !drafted;
+  by_id("name_a").textContent = `${comparing ? "A  " : ""}${(shown.draft ?? a).kind}${drafted ? `: draft; ${a.kind} when the light rests` : ""}`;
   by_id("name_b").textContent = `B  ${b.kind}${shown.b === null ? ": to come" : stale ? ": earlier" : ""}`;
   by_id("divider").hidden = by_id("wipe_row").hidden = view.mode !== "wipe";
   by_id("legend").hidden = view.mode !== "difference";
+  show_picture_choice(view);
+  if (source.picture) share.refresh();
   by_id("b_section").hidden = !comparing;
   show_overlay();
   figures_timer ||= setTimeout(show_figures, FIGURES_MS);
+}
+
+/** @param {import("./picture.js").Picture | null} picture */
+function use_picture(picture) {
+  source = { ...source, picture };
+  choose_picture(view, picture);
+  share.refresh();
 }
 
 function show_overlay() {
@@ -165,12 +208,13 @@ function show_overlay() {
 
 function show_figures() {
   figures_timer = 0;
-  const fresh_b = view.mode !== "mask" && shown.b_version === version;
+  const fresh_b = view.mode !== "mask" && shown.b_version === version && !shown.draft;
+  const kind = shown.draft ? `${shown.draft.kind}, draft` : a.kind;
   const tables = [];
   if (fresh_b && view.a && view.b) {
     if (view.comparable) tables.push(error_table(compare(view.a, view.b), a.kind, b.kind));
   }
-  if (shown.a) tables.push(stage_table(view.mode === "mask" ? a.kind : `A  ${a.kind}`, shown.a.stages, shown.a.ms));
+  if (shown.a) tables.push(stage_table(view.mode === "mask" ? kind : `A  ${kind}`, shown.a.stages, shown.a.ms));
   if (fresh_b && shown.b) tables.push(stage_table(`B  ${b.kind}`, shown.b.stages, shown.b.ms));
   by_id("figures").replaceChildren(...tables);
   const warnings = (shown.a?.warnings ?? []).map((text) => Object.assign(document.createElement("li"), { textContent: text }));
@@ -181,13 +225,15 @@ const light_panel = new LightPanel(by_id("light"), (next) => {
   const kind_changed = next.kind !== light.kind;
   light = next;
   if (kind_changed) show_techniques();
-  update();
+  update(true);
 });
 
 function show_techniques() {
   const fits = { light: light.kind, suggested: source.suggested };
+  show_draft_choice();
   technique_panel(by_id("technique_a"), techniques, a, fits, (next) => {
     a = next;
+    show_draft_choice();
     update();
   });
   technique_panel(by_id("technique_b"), techniques, b, fits, (next) => {
@@ -195,6 +241,14 @@ function show_techniques() {
     shown.b = null;
     update();
   });
+}
+
+/** The switch of drafts, where there is one for A's technique. How long the two take is new. */
+function show_draft_choice() {
+  Object.assign(taken_ms, { draft: 0, full: Infinity });
+  const draft = draft_of(techniques, a, source, light.kind);
+  by_id("draft_row").hidden = draft === null;
+  if (draft) by_id("draft_help").textContent = `${draft.kind} while the light moves, ${a.kind} when it rests, unless that is as quick.`;
 }
 
 /** Sizes of what the service renders; given images have their own. */
@@ -215,8 +269,11 @@ function show_resolutions() {
 
 /** @param {Source} next */
 function use(next) {
-  stop_orbit();
+  orbit.stop();
+  const other = next.kind !== source.kind;
   source = next;
+  // Another kind of source takes the technique that is its own.
+  if (other) a = known(next.technique || FIRST.a, 0);
   // What suits the new source takes the place of what suited the last.
   const suited = (/** @type {Choice} */ choice) => {
     const own = Object.entries(choice.settings).filter(([key]) => !(key in next.suggested));
@@ -226,25 +283,39 @@ function use(next) {
   b = suited(b);
   light = next.light;
   view.b = shown.b = null;
+  // Masks of the last source that are still on their way come too late.
+  shown.a_version = version + 1;
+  shown.b_version = version;
+  use_picture(next.picture);
   by_id("orbit").disabled = next.fixed_light !== "";
   by_id("problem").hidden = true;
   light_panel.show(source, light);
   show_techniques();
   show_resolutions();
-  update();
+  update(true);
 }
 
 const share = new SharePanel(by_id("share"), {
-  state: () => ({ scene: scene_json(source, light, a), files: source.files, token: client.token !== "" }),
-  download: async (format) => {
+  state: () => ({
+    scene: scene_json(source, light, a), files: source.files, token: client.token !== "",
+    bounds: techniques.some((one) => one.kind === a.kind && one.bounds),
+    picture: view.shows_picture && view.picture ? { name: view.picture.name, whole: view.picture.size === `${view.a?.width} x ${view.a?.height}` } : null,
+  }),
+  download: async ({ image, media_type, extension }) => {
     try {
-      const reply = await client.mask(scene_json(source, light, a), source.files, format.media_type);
-      save(new Blob([reply.buffer], { type: format.media_type }), `mask.${format.extension}`);
-      say(`mask.${format.extension} saved`);
+      say(`Computing ${image}.${extension}`);
+      const reply = await client.mask(scene_json(source, light, a), source.files, media_type, image);
+      save(new Blob([reply.buffer], { type: media_type }), `${image}.${extension}`);
+      say(`${image}.${extension} saved`);
     } catch (error) {
+      say("");
       fail(error);
     }
   },
+  download_picture: () => by_id("mask").toBlob((/** @type {Blob} */ blob) => {
+    save(blob, "preview.png");
+    say("preview.png saved");
+  }),
   say,
 });
 
@@ -252,6 +323,10 @@ const source_panel = new SourcePanel(by_id("source"), {
   use: (next) => {
     say(`Lighting ${next.title}`);
     use(next);
+  },
+  use_picture: (picture) => {
+    use_picture(picture);
+    show_masks();
   },
   measure: (name, file, encoding, fov_deg) => {
     say("Measuring how far the subject is");
@@ -263,28 +338,15 @@ const source_panel = new SourcePanel(by_id("source"), {
   },
 });
 
-// The light on a circle about its target: to see the shadow follow, and to measure how fast.
-let orbit_frame = 0;
-function stop_orbit() {
-  cancelAnimationFrame(orbit_frame);
-  orbit_frame = 0;
-  by_id("orbit").setAttribute("aria-pressed", "false");
-}
-function start_orbit() {
-  const { position, target } = light;
-  const [x, z] = [position[0] - target[0], position[2] - target[2]];
-  const begun = performance.now();
-  const step = (/** @type {number} */ now) => {
-    const turn = 0.35 * Math.sin((now - begun) / 1500);
-    const [c, s] = [Math.cos(turn), Math.sin(turn)];
-    light = { ...light, position: [target[0] + c * x - s * z, position[1], target[2] + s * x + c * z] };
+// To see the shadow follow, and to measure how fast.
+const orbit = new Orbit(by_id("orbit"), {
+  light: () => light,
+  moved: (next) => {
+    light = next;
     light_panel.follow(light);
-    update();
-    orbit_frame = requestAnimationFrame(step);
-  };
-  orbit_frame = requestAnimationFrame(step);
-  by_id("orbit").setAttribute("aria-pressed", "true");
-}
+    update(true);
+  },
+});
 
 function wire() {
   by_id("modes").addEventListener("change", (/** @type {any} */ event) => {
@@ -297,23 +359,14 @@ function wire() {
     view.draw();
   });
   by_id("casters").addEventListener("change", show_overlay);
-  by_id("orbit").addEventListener("click", () => (orbit_frame ? stop_orbit() : start_orbit()));
-  const wipe_to = (/** @type {number} */ share_of_width) => {
-    view.wipe = Math.min(Math.max(share_of_width, 0), 1);
-    by_id("wipe").value = String(100 * view.wipe);
-    by_id("frame").style.setProperty("--wipe", String(view.wipe));
-    view.draw();
-  };
-  by_id("wipe").addEventListener("input", () => wipe_to(by_id("wipe").valueAsNumber / 100));
+  by_id("shows").addEventListener("change", (/** @type {any} */ event) => {
+    view.shows = event.target.value;
+    show_masks();
+    share.refresh();
+  });
+  by_id("draft").addEventListener("change", () => update());
+  wire_wipe(view, by_id("frame"), by_id("wipe"));
   const frame = by_id("frame");
-  const drag = (/** @type {PointerEvent} */ event) => {
-    if (view.mode !== "wipe" || (event.type === "pointermove" && !frame.hasPointerCapture(event.pointerId))) return;
-    frame.setPointerCapture(event.pointerId);
-    const box = frame.getBoundingClientRect();
-    wipe_to((event.clientX - box.left) / box.width);
-  };
-  frame.addEventListener("pointerdown", drag);
-  frame.addEventListener("pointermove", drag);
   new ResizeObserver(show_overlay).observe(frame);
 
   addEventListener("dragover", (event) => {

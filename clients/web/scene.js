@@ -10,9 +10,11 @@ import { light_json } from "./light.js";
 /** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
  * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
 /** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows,
- * `suggested` the settings that suit it, for techniques that have such a key.
+ * `suggested` the settings that suit it, for techniques that have such a key. `technique` is the kind that suits it ("": the page's first);
+ * `drafts` are kinds that may stand in for a traced one while the light moves. `picture` is what the depth belongs to.
  * @typedef {{kind: string, title: string, objects: Json[], occluders: Json, receivers: Json, files: Files, room: Room, light: Light,
- *            fixed_light: string, lights: string[], renders: boolean, suggested: Json}} Source */
+ *            fixed_light: string, lights: string[], renders: boolean, suggested: Json, technique: string, drafts: string[],
+ *            picture: import("./picture.js").Picture | null}} Source */
 
 const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
 
@@ -27,20 +29,22 @@ export function courtyard_source() {
       width: 0.9, height: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
+    technique: "", drafts: [], picture: null,
   };
 }
 
 /** One camera's depth image, in the camera's own space: at the origin, looking along -Z. The light begins beside the camera.
- * @param {{name: string, file: Blob, encoding: Json, vertical_fov_deg: number, distance: number}} given
+ * @param {{name: string, file: Blob, encoding: Json, vertical_fov_deg: number, distance: number, picture?: import("./picture.js").Picture | null}} given
  *   `distance`: how far the middle of the picture is, in scene units
  * @returns {Source} */
-export function camera_source({ name, file, encoding, vertical_fov_deg, distance }) {
+export function camera_source({ name, file, encoding, vertical_fov_deg, distance, picture = null }) {
   const camera = { kind: "pinhole", eye: [0, 0, 0], target: [0, 0, -distance], up: [0, 1, 0], vertical_fov_deg };
   const coded = encoding.kind === "planar" && Object.keys(encoding).length === 1 ? {} : { encoding };
   return {
     kind: "camera", title: name, files: new Map([[name, file]]),
     objects: [{ depth: name, camera, ...coded }],
-    occluders: { resolution: [384, 384] }, receivers: { camera, depth: name, ...coded },
+    // Fine enough for drafts, and quickly rendered: most of their time. Rays through the image need no map.
+    occluders: { resolution: [128, 128] }, receivers: { camera, depth: name, ...coded },
     room: { middle: [0, 0, -distance], reach: 1.6 * distance, low: -1.5 * distance, high: 2 * distance },
     light: {
       kind: "rectangle", position: [-0.7 * distance, 0.8 * distance, -0.5 * distance], target: [0, 0, -distance],
@@ -48,6 +52,8 @@ export function camera_source({ name, file, encoding, vertical_fov_deg, distance
     },
     // A camera's depth has no back sides.
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "front" },
+    // What the service takes by itself for depth alone; it is slow, and these are quick.
+    technique: "depth_trace", drafts: ["soft_shadow_map", "shadow_map"], picture,
   };
 }
 
@@ -67,6 +73,7 @@ export function light_view_source({ front, back, receiver, encoding, tan_half_fo
     },
     fixed_light: "Only the size can change: these maps were seen from this light's centre along its axis. Another place would need other maps.",
     lights: ["rectangle", "point"], renders: false, suggested: { sides: back ? "both" : "front" },
+    technique: "", drafts: [], picture: null,
   };
 }
 

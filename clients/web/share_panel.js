@@ -4,14 +4,19 @@ import { button, element } from "./fields.js";
 
 /** @typedef {import("./client.js").Json} Json */
 /** @typedef {import("./client.js").Files} Files */
+/** `bounds`: the technique has them. `picture`: the one that is shown under the light, and whether it has the mask's size.
+ * @typedef {{scene: Json, files: Files, token: boolean, bounds: boolean, picture: {name: string, whole: boolean} | null}} State */
 
-/** @type {{label: string, extension: string, media_type: string}[]} */
+/** @typedef {{label: string, extension: string, media_type: string, image: import("./client.js").MaskImage}} Format */
+/** @type {Format[]} */
 export const FORMATS = [
-  { label: "PNG, 16 bit", extension: "png", media_type: "image/png" },
-  { label: "EXR", extension: "exr", media_type: "image/x-exr" },
-  { label: "TIFF", extension: "tif", media_type: "image/tiff" },
-  { label: "PFM", extension: "pfm", media_type: "image/x-portable-floatmap" },
+  { label: "PNG, 16 bit", extension: "png", media_type: "image/png", image: "mask" },
+  { label: "EXR", extension: "exr", media_type: "image/x-exr", image: "mask" },
+  { label: "TIFF", extension: "tif", media_type: "image/tiff", image: "mask" },
+  { label: "PFM", extension: "pfm", media_type: "image/x-portable-floatmap", image: "mask" },
 ];
+/** @type {Format} */
+const BOUND = { label: "Bounds, EXR", extension: "exr", media_type: "image/x-exr", image: "bound" };
 
 /** One line a key, arrays on one line. @param {Json} scene */
 export function scene_text(scene) {
@@ -28,7 +33,8 @@ export function curl_line(files, origin, token) {
   return `curl --fail-with-body${secret} -H 'Accept: image/x-exr' ${parts.join(" ")} ${origin}/v1/masks -o mask.exr`;
 }
 
-export const penumbra_line = () => "penumbra mask scene.json -o mask.exr";
+/** `picture` is laid under the mask where it has the mask's size: the command scales none. @param {State["picture"]} [picture] */
+export const penumbra_line = (picture = null) => `penumbra mask scene.json -o mask.exr${picture?.whole ? ` --over '${picture.name.replaceAll("'", "'\\''")}' --preview preview.png` : ""}`;
 
 /** @param {Blob} blob @param {string} name */
 export function save(blob, name) {
@@ -57,20 +63,23 @@ function copyable(label, id, text, say) {
 
 export class SharePanel {
   /** @param {HTMLElement} place
-   * @param {{state: () => {scene: Json, files: Files, token: boolean}, download: (format: typeof FORMATS[number]) => void, say: (said: string) => void}} page */
+   * @param {{state: () => State, download: (format: Format) => void, download_picture: () => void, say: (said: string) => void}} page */
   constructor(place, page) {
     this.page = page;
     this.scene = copyable("Scene file", "scene_text", () => scene_text(page.state().scene), page.say);
     this.curl = copyable("curl", "curl_line", () => this.#curl(), page.say);
-    this.penumbra = copyable("Command line", "penumbra_line", penumbra_line, page.say);
+    this.penumbra = copyable("Command line", "penumbra_line", () => penumbra_line(page.state().picture), page.say);
     const downloads = FORMATS.map((format) => button(format.label, () => page.download(format)));
+    this.bound = button(BOUND.label, () => page.download(BOUND));
+    this.bound.title = "The lowest and the highest visibility that each pixel can have: what lies behind the depth that was seen is a guess";
+    this.picture = button("Picture, PNG", () => page.download_picture());
     const scene = button("scene.json", () => save(new Blob([scene_text(page.state().scene)], { type: "application/json" }), "scene.json"));
     const details = element("details", {}, element("summary", {}, "Show the scene file"), this.scene.node);
     this.details = details;
     details.addEventListener("toggle", () => this.refresh());
     place.append(
       element("h3", {}, "Download"),
-      element("div", { className: "buttons", role: "group", ariaLabel: "Download" }, ...downloads, scene),
+      element("div", { className: "buttons", role: "group", ariaLabel: "Download" }, ...downloads, this.bound, this.picture, scene),
       element("p", { className: "help", id: "files_note" }), this.penumbra.node, this.curl.node, details,
     );
     this.note = /** @type {HTMLElement} */ (place.querySelector("#files_note"));
@@ -82,10 +91,12 @@ export class SharePanel {
   }
 
   refresh() {
-    const { scene, files } = this.page.state();
+    const { scene, files, bounds, picture } = this.page.state();
+    this.bound.hidden = !bounds;
+    this.picture.hidden = picture === null;
     this.note.textContent = `The lines below take scene.json${files.size > 0 ? ` and, beside it, ${[...files.keys()].join(", ")}` : ""}.`;
     this.curl.area.textContent = this.#curl();
-    this.penumbra.area.textContent = penumbra_line();
+    this.penumbra.area.textContent = penumbra_line(picture);
     // Long, so only while it is seen.
     if (this.details.open) this.scene.area.textContent = scene_text(scene);
   }

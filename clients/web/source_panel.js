@@ -1,11 +1,13 @@
 // @ts-check
-// What is lit: the bundled scene, or depth maps that are dropped or picked.
-import { button, choice_field, element, number_field } from "./fields.js";
+// What is lit: the bundled scene, or depth maps that are dropped or picked, one camera's with its picture.
+import { button, choice_field, element, flag_field, number_field } from "./fields.js";
+import { look_of, part_name, picture_among, roles_of } from "./files.js";
+import { Picture } from "./picture.js";
 import { camera_source, courtyard_source, light_view_source } from "./scene.js";
 
 /** @typedef {import("./scene.js").Source} Source */
 /** @typedef {import("./client.js").Json} Json */
-/** @typedef {"front" | "back" | "receiver" | "depth"} Role */
+/** @typedef {import("./files.js").Role} Role */
 
 const ENCODINGS = {
   planar: "Planar: distance along the axis", radial: "Radial: distance to the camera", disparity: "Disparity: 1 / depth",
@@ -13,35 +15,16 @@ const ENCODINGS = {
 };
 const RANGED = ["window", "reversed_window", "normalized"];
 const ACCEPTED = ".exr,.png,.tif,.tiff,.pfm,.hdr";
-
-/** A name that a part of a request may have: the file's own, where it is one.
- * @param {string} given @param {string} role @param {string[]} taken */
-export function part_name(given, role, taken) {
-  const kept = given.replaceAll(/[^A-Za-z0-9._-]/g, "_").replace(/^\.+/, "").slice(-128);
-  const name = kept === "" || kept === "scene" ? role : kept;
-  return taken.includes(name) ? `${role}_${name}`.slice(0, 128) : name;
-}
-
-/** Which file is which, by name, else by order.
- * @param {File[]} files @returns {Partial<Record<Role, File>>} */
-export function roles_of(files) {
-  if (files.length === 1) return { depth: files[0] };
-  /** @type {Partial<Record<Role, File>>} */
-  const roles = {};
-  const rest = files.filter((file) => {
-    const role = /back/i.test(file.name) ? "back" : /recei|floor|ground/i.test(file.name) ? "receiver" : /front|occlu/i.test(file.name) ? "front" : null;
-    if (!role || roles[role]) return true;
-    roles[role] = file;
-    return false;
-  });
-  for (const role of /** @type {Role[]} */ (["front", "receiver", "back"])) if (!roles[role] && rest.length > 0) roles[role] = rest.shift();
-  return roles;
-}
+const PICTURES = ".jpg,.jpeg,.png,image/*";
 
 export class SourcePanel {
   kind = "courtyard";
   /** @type {Partial<Record<Role, File>>} */
   files = {};
+  /** What was said of the picture: why it is taken for one. */
+  look = "";
+  /** The depth file that is lit. @type {File | undefined} */
+  lit = undefined;
   /** @type {Json} */
   encoding = { kind: "planar" };
   fov_deg = 50;
@@ -49,7 +32,7 @@ export class SourcePanel {
   distance = 0;
 
   /** @param {HTMLElement} place
-   * @param {{use: (source: Source) => void, measure: (name: string, file: Blob, encoding: Json, fov_deg: number) => Promise<number>,
+   * @param {{use: (source: Source) => void, use_picture: (picture: Picture | null) => void, measure: (name: string, file: Blob, encoding: Json, fov_deg: number) => Promise<number>,
    *          failed: (error: unknown) => void}} page */
   constructor(place, page) {
     this.place = place;
@@ -64,19 +47,20 @@ export class SourcePanel {
         this.kind = kind;
         this.show();
         this.place.querySelector("select")?.focus();
+        this.lit = undefined;
         if (kind === "courtyard") this.page.use(courtyard_source());
       },
     );
     this.place.replaceChildren(pick.node);
     if (this.kind === "camera") this.place.append(...this.#camera());
     if (this.kind === "light_view") this.place.append(...this.#light_view());
-    if (this.kind === "courtyard") this.place.append(element("p", { className: "help" }, "Or drop depth maps anywhere on the page: EXR, PNG, TIFF or PFM."));
+    if (this.kind === "courtyard") this.place.append(element("p", { className: "help" }, "Or drop depth maps anywhere on the page: EXR, PNG, TIFF or PFM. One camera's depth may come with its picture, a JPEG or PNG."));
   }
 
   #camera() {
     return [
       element("p", { className: "help" }, "What the camera sees both casts and receives; what it does not see casts no shadow."),
-      this.#file("depth", "Depth pass"),
+      this.#file("depth", "Depth pass"), this.#picture(),
       number_field({ label: "Vertical field of view", name: "fov", value: this.fov_deg, min: 0.1, max: 179, unit: "degrees" }, (value) => (this.fov_deg = value)).node,
       ...this.#common(),
     ];
@@ -102,6 +86,38 @@ export class SourcePanel {
     return element("div", { className: "field" }, element("label", { htmlFor: input.id }, label), element("div", { className: "control" }, input), chosen);
   }
 
+  /** The picture's field: it is shown at once over the depth that is lit. */
+  #picture() {
+    const { picture, depth } = this.files;
+    const input = element("input", { type: "file", accept: PICTURES, name: "picture", id: "file_picture" });
+    const field = element("div", { className: "field" }, element("label", { htmlFor: input.id }, "Picture (optional)"), element("div", { className: "control" }, input));
+    const said = picture ? `${picture.name}${this.look ? `, a ${this.look}` : ""}: taken as the picture. The depth is ${depth?.name ?? "still missing"}.` : "What the depth shows, to see it under the new light: JPEG or PNG.";
+    field.append(element("p", { className: "help", id: "picture_said" }, said));
+    input.addEventListener("change", async () => {
+      this.files.picture = input.files?.[0];
+      this.look = this.files.picture ? await look_of(this.files.picture) : "";
+      this.show();
+      if (depth && this.lit === depth) await this.#show_picture();
+    });
+    if (picture && depth) field.append(button("Swap picture and depth", () => {
+      this.files = { ...this.files, depth: picture, picture: depth };
+      this.look = "";
+      this.show();
+      this.apply();
+    }, "quiet"));
+    return field;
+  }
+
+  /** Lays the picture over the depth that is lit already. */
+  async #show_picture() {
+    try {
+      const { picture } = this.files;
+      this.page.use_picture(picture ? await Picture.read(picture) : null);
+    } catch (error) {
+      this.page.failed(error);
+    }
+  }
+
   #common() {
     const ranged = RANGED.includes(this.encoding.kind);
     const set = (/** @type {string} */ key) => (/** @type {number} */ value) => (this.encoding = { ...this.encoding, [key]: value });
@@ -115,21 +131,46 @@ export class SourcePanel {
     if (ranged)
       fields.push(number_field({ label: "Near", name: "near", value: this.encoding.near, min: 0 }, set("near")).node,
         number_field({ label: "Far", name: "far", value: this.encoding.far, min: 0 }, set("far")).node);
-    fields.push(number_field({ label: "Scale of depth", name: "scale", value: this.encoding.scale ?? 1, help: "multiplies the depth" }, set("scale")).node);
+    const disparity = this.encoding.kind === "disparity";
+    const meaning = disparity ? "multiplies the disparity" : "multiplies the depth";
+    fields.push(number_field({ label: disparity ? "Scale" : "Scale of depth", name: "scale", value: this.encoding.scale ?? 1, help: meaning }, set("scale")).node);
+    if (disparity) fields.push(number_field({ label: "Shift", name: "shift", value: this.encoding.shift ?? 0, help: "1 / depth = scale x value + shift" }, set("shift")).node);
+    if (ranged || disparity) fields.push(flag_field({ label: "0 is a hole", name: "empty", value: this.encoding.empty === 0, help: "pixels with the value 0 show nothing" }, (holes) => {
+      const { empty, ...rest } = this.encoding;
+      this.encoding = holes ? { ...rest, empty: 0 } : rest;
+    }).node);
     fields.push(number_field(
       { label: "Distance of the subject", name: "distance", value: this.distance, min: 0, help: "in scene units, to place the light; 0: the median depth, measured by the service" },
       (value) => (this.distance = value)).node);
     return [...fields, button("Light it", () => this.apply(), "primary")];
   }
 
-  /** Files that were dropped: sorted by their names and used. @param {File[]} files */
-  drop(files) {
+  /** Files that were dropped: sorted by what they hold and by their names, and used. @param {File[]} files */
+  async drop(files) {
     if (files.length === 0) return;
-    if (files.length > 3) return this.page.failed(new Error(`${files.length} files were dropped; expected one camera's depth, or front, back and receivers seen from a light`));
-    this.files = roles_of(files);
-    this.kind = files.length === 1 ? "camera" : "light_view";
+    try {
+      await this.#take(files);
+    } catch (error) {
+      this.page.failed(error);
+    }
+  }
+
+  /** @param {File[]} files */
+  async #take(files) {
+    const { depth, picture, look } = await picture_among(files);
+    if (depth.length > 3 || (picture && depth.length > 1))
+      throw new Error(`${files.length} files were dropped; expected one camera's depth, perhaps with its picture, or front, back and receivers seen from a light`);
+    const light_view = depth.length > 1;
+    // A picture by itself belongs to the depth that is there, and depth by itself to a picture that has none yet.
+    const waiting = this.files.depth ? undefined : this.files.picture;
+    const kept = depth.length === 0 ? this.files.depth : undefined;
+    this.files = light_view ? roles_of(depth) : { depth: depth[0] ?? kept, picture: picture ?? waiting };
+    if (picture) this.look = look;
+    this.kind = light_view ? "light_view" : "camera";
     this.show();
-    this.apply();
+    if (kept && this.lit === kept) return this.#show_picture();
+    if (!light_view && !this.files.depth) throw new Error(`${picture?.name} is taken as a picture, a ${look}. Its depth image is missing: drop it, too, or choose it under Scene.`);
+    await this.apply();
   }
 
   async apply() {
@@ -150,12 +191,16 @@ export class SourcePanel {
   async #source() {
     const encoding = { ...this.encoding };
     if (encoding.scale === 1) delete encoding.scale;
+    if (encoding.shift === 0) delete encoding.shift;
     const common = { encoding, vertical_fov_deg: this.fov_deg };
     const measured = (/** @type {string} */ name, /** @type {Blob} */ file) => (this.distance > 0 ? this.distance : this.page.measure(name, file, encoding, this.fov_deg));
     if (this.kind === "camera") {
       const file = this.#needed("depth", "Depth pass");
       const name = part_name(file.name, "depth", []);
-      return camera_source({ ...common, name, file, distance: await measured(name, file) });
+      const picture = this.files.picture ? await Picture.read(this.files.picture) : null;
+      const source = camera_source({ ...common, name, file, distance: await measured(name, file), picture });
+      this.lit = file;
+      return source;
     }
     const front = this.#needed("front", "Occluders, front"), receiver = this.#needed("receiver", "Receivers"), back = this.files.back;
     const front_name = part_name(front.name, "front", []);

@@ -48,6 +48,23 @@ export function suggested_choice(techniques, kind, suggested) {
   return { kind, settings: Object.fromEntries(fitting) };
 }
 
+/** Kinds that follow rays, each from every receiver: slow, and what others are drafts of. */
+const TRACED = ["depth_trace", "ray_traced"];
+/** What makes a draft quick, for techniques that have such a key. @type {Json} */
+const DRAFTED = { resolution: 96 };
+
+/** The quick technique that may stand in for a traced one while the light moves: the first of the source's drafts that takes the light.
+ * @param {Technique[]} techniques @param {Choice} choice @param {{drafts: string[], suggested: Json}} source @param {string} light its kind
+ * @returns {Choice | null} */
+export function draft_of(techniques, choice, source, light) {
+  if (!TRACED.includes(choice.kind)) return null;
+  const kind = source.drafts.find((one) => techniques.some((known) => known.kind === one && known.lights.includes(light)));
+  if (!kind) return null;
+  const keys = techniques.find((one) => one.kind === kind)?.schema.properties ?? {};
+  const quick = Object.fromEntries(Object.entries(DRAFTED).filter(([key]) => key in keys));
+  return { kind, settings: { ...suggested_choice(techniques, kind, source.suggested).settings, ...quick } };
+}
+
 /** Fills `place` with the choice of technique and its controls, and calls `changed` with each new choice.
  * @param {HTMLElement} place @param {Technique[]} techniques @param {Choice} choice
  * @param {{light: string, suggested: Json}} fits kind of the light, and settings that suit the source @param {(choice: Choice) => void} changed */

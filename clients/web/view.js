@@ -1,9 +1,10 @@
 // @ts-check
-// The mask on the screen: alone, wiped against another, or as their difference.
+// The mask on the screen, or the picture under its light: alone, wiped against another, or as the difference of two masks.
 import { difference_image } from "./metrics.js";
 
 /** @typedef {import("./pfm.js").FloatImage} FloatImage */
 /** @typedef {"mask" | "wipe" | "difference"} Mode */
+/** @typedef {"mask" | "picture"} Shows */
 /** @typedef {"values" | "light"} Tone as the PNG holds them, or encoded as sRGB as a viewer of linear images shows them */
 
 /** Full colour of the difference view. */
@@ -22,7 +23,7 @@ function table_of(tone) {
 }
 
 /** @param {FloatImage} mask @param {Uint8ClampedArray} table */
-function picture_of(mask, table) {
+function grey_of(mask, table) {
   const image = new ImageData(mask.width, mask.height);
   const { pixels } = mask;
   const at = (/** @type {number} */ sample) => (4096 * pixels[sample] + 0.5) | 0;
@@ -50,6 +51,10 @@ export class View {
   #tone = "values";
   #table = table_of("values");
   wipe = 0.5;
+  /** @type {import("./picture.js").Picture | null} */
+  picture = null;
+  /** @type {Shows} what is wished for; the picture needs one that fits the mask */
+  shows = "mask";
 
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
@@ -72,6 +77,16 @@ export class View {
     return this.a !== null && this.b !== null && this.a.width === this.b.width && this.a.height === this.b.height && this.a.channels === this.b.channels;
   }
 
+  /** Whether the picture is what is seen. */
+  get shows_picture() {
+    return this.shows === "picture" && this.mode !== "difference" && this.picture !== null && this.a !== null && this.picture.fits(this.a);
+  }
+
+  /** @param {FloatImage} mask */
+  #image_of(mask) {
+    return this.shows_picture && this.picture ? this.picture.under(mask) : grey_of(mask, this.#table);
+  }
+
   draw() {
     const { a, b } = this;
     if (!a) return;
@@ -83,9 +98,9 @@ export class View {
       this.context.putImageData(difference_image(a, b, DIFFERENCE_SCALE), 0, 0);
       return;
     }
-    this.context.putImageData(picture_of(a, this.#table), 0, 0);
+    this.context.putImageData(this.#image_of(a), 0, 0);
     if (!b || !this.comparable || this.mode !== "wipe") return;
     const from = Math.round(this.wipe * a.width);
-    this.context.putImageData(picture_of(b, this.#table), 0, 0, from, 0, a.width - from, a.height);
+    this.context.putImageData(this.#image_of(b), 0, 0, from, 0, a.width - from, a.height);
   }
 }

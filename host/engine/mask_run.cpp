@@ -256,6 +256,7 @@ std::vector<WorkAmount> work_of(const MaskJob& job)
 {
     MaskShape shape{.receivers = {job.receivers->width, job.receivers->height}, .occluders = {}};
     for (const MaskLight& light : job.lights) shape.occluders.push_back({light.occluders->width, light.occluders->height});
+    shape.bound = job.bound;
     return std::visit([&](const auto& settings) { return work(settings, shape); }, job.technique);
 }
 
@@ -287,6 +288,7 @@ void Engine::masks(const Scene& scene, const Technique& technique, const MaskSin
 
 void Engine::masks(const MaskJob& job, const MaskHooks& hooks, const MaskSink& sink) const
 {
+    if (job.bound) require_bounds(job.technique);
     MaskRun run(*this, job, hooks);
     const int frames = run.frames();
     for (int frame = frames > 0 ? 1 : 0; frame <= frames; ++frame) {

@@ -54,7 +54,8 @@ Json json_of(const TechniqueRow& row)
             {"source", row.source},
             {"lights", row.lights},
             {"textured_lights", row.textured_lights},
-            {"inputs", row.inputs}};
+            {"inputs", row.inputs},
+            {"bounds", row.bounds}};
 }
 
 Json domain_json(const SettingKey& setting) { return std::visit(DomainJson{}, setting.domain); }

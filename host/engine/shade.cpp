@@ -127,11 +127,16 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const Receivers
 
 } // namespace
 
+void require_bounds(const Technique& technique)
+{
+    if (!row_of(kind_of(technique)).bounds)
+        throw Error(ErrorCode::unsupported, kind_of(technique) + " has no bounds", "depth_trace and ray_traced have");
+}
+
 Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bound) const
 {
     const Prepared::State& state = prepared.state();
-    if (bound && !row_of(kind_of(state.technique)).bounds)
-        throw Error(ErrorCode::unsupported, kind_of(state.technique) + " has no bounds", "depth_trace and ray_traced have");
+    if (bound) require_bounds(state.technique);
     if (!receivers.depth)
         throw Error::at(ErrorCode::invalid_input, "receivers.depth", "is missing",
                         "expected a depth map; with_depth renders it from objects");

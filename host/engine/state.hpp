@@ -47,6 +47,9 @@ struct Prepared::State {
 // Throws unsupported when the technique does not take this light.
 void check_light(const Light& light, const Technique& technique);
 
+// Throws unsupported for a technique that has no bounds.
+void require_bounds(const Technique& technique);
+
 // The time of all stages but compiling and rendering depth.
 double work_ms(const std::vector<Stage>& stages);
 

@@ -95,7 +95,7 @@ std::vector<std::byte> encode_image(const Image& image, const OutputFormat& requ
     const std::string title = format.format + " with " + std::to_string(format.bits) + " bits";
     if (holds_integers(format)) {
         check_values(image, title, "0 to 1", [](float v) { return v >= -rounding_noise && v <= 1 + rounding_noise; });
-        if (format.format == "png") return encode_png(image, format.bits);
+        if (format.format == "png") return encode_png(image, format.bits, format.srgb);
         return openimageio().encode(clamped(image), ImageFormat::tiff, format.bits);
     }
     if (format.format == "pfm") return encode_pfm(image);

@@ -66,7 +66,8 @@ ImageFormat format_of(const OutputFormat& output)
 OutputFormat checked(const OutputFormat& output, std::string_view where)
 {
     const std::string prefix = where.empty() ? std::string() : std::string(where) + ": ";
-    OutputFormat result{lower(output.format), output.bits, output.channels};
+    OutputFormat result = output;
+    result.format = lower(output.format);
     const WrittenFormat* found = find(result.format);
     if (!found && result.format.empty()) throw Error(ErrorCode::usage, prefix + "no image format given", std::string(formats_hint));
     if (!found) throw Error(ErrorCode::usage, prefix + "unknown image format \"" + output.format + "\"", std::string(formats_hint));

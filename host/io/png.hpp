@@ -11,9 +11,10 @@
 
 namespace penumbra {
 
-// 1 to 4 channels with 8 or 16 bits, linear (gAMA 1). Values are in [0, 1], or as good as: they are clamped. Always the same bytes for the
-// same pixels. OpenImageIO takes several times as long: zlib at level 6, and all five filters tried (docs/bench.md has times and sizes).
-std::vector<std::byte> encode_png(const Image& image, int bits);
+// 1 to 4 channels with 8 or 16 bits, as they stand; the file says that they are linear (gAMA 1) or sRGB. Values are in [0, 1], or as good
+// as: they are clamped. Always the same bytes for the same pixels. OpenImageIO takes several times as long: zlib at level 6, and all five
+// filters tried (docs/bench.md has times and sizes).
+std::vector<std::byte> encode_png(const Image& image, int bits, bool srgb = false);
 
 struct PngImage {
     int width = 0, height = 0;

@@ -52,7 +52,7 @@ Buffer filtered(const Image& image, int bits)
 
 } // namespace
 
-std::vector<std::byte> encode_png(const Image& image, int bits)
+std::vector<std::byte> encode_png(const Image& image, int bits, bool srgb)
 {
     // Grey, RGB; with alpha 4 more.
     constexpr std::array colour_types{std::byte{0}, std::byte{4}, std::byte{2}, std::byte{6}};
@@ -66,7 +66,10 @@ std::vector<std::byte> encode_png(const Image& image, int bits)
     constexpr int fastest = 1;
     std::vector<std::byte> png(png_signature.begin(), png_signature.end());
     append_chunk(png, "IHDR", header);
-    append_chunk(png, "gAMA", big_endian(100000)); // 1: linear
+    // Of sRGB the intent is 0, perceptual; gAMA stands beside it for who knows no sRGB (PNG 2nd edition, 11.3.3.5). Else 1: linear.
+    constexpr std::array perceptual{std::byte{0}};
+    if (srgb) append_chunk(png, "sRGB", perceptual);
+    append_chunk(png, "gAMA", big_endian(srgb ? 45455 : 100000));
     append_rows(png, filtered(image, bits), fastest);
     append_chunk(png, "IEND", {});
     return png;

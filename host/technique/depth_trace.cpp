@@ -224,7 +224,10 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
 
 std::vector<WorkAmount> work(const DepthTrace& settings, const MaskShape& shape)
 {
-    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples, WorkAmount::Unit::rays, "rays"}};
+    // Rays for the bound do not end at what blocks them and go one by one, not in bundles: each took 14 to 21 times as long as one for the
+    // mask.
+    const int rays_a_sample = shape.bound ? 16 : 1;
+    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples * rays_a_sample, WorkAmount::Unit::rays, "rays"}};
 }
 
 std::vector<opencl::Specialisation> specialisations(const DepthTrace&, int lanes) { return {depth_trace_program(lanes)}; }

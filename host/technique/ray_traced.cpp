@@ -57,7 +57,9 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
 
 std::vector<WorkAmount> work(const RayTraced& settings, const MaskShape& shape)
 {
-    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples, WorkAmount::Unit::rays, "rays"}};
+    // Rays for the bound do not end at what blocks them.
+    const int rays_a_sample = shape.bound ? 2 : 1;
+    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples * rays_a_sample, WorkAmount::Unit::rays, "rays"}};
 }
 
 std::vector<opencl::Specialisation> specialisations(const RayTraced&, int) { return {}; }

@@ -129,7 +129,7 @@ struct MaskShape {
     };
     Map receivers{};
     std::vector<Map> occluders; // of each light
-
+    bool bound = false;         // whether the bound is wanted, too
     double pixels() const { return static_cast<double>(receivers.width) * receivers.height; }
     double lights() const { return static_cast<double>(occluders.size()); }
 };

@@ -59,7 +59,7 @@ Json mask_answer()
 {
     Json formats = Json::object();
     for (const MaskFormat& format : mask_formats()) formats.update(content(format.media_type, binary_schema));
-    return {{"description", "the mask: visibility, linear, 1 fully lit"},
+    return {{"description", "the mask: visibility, linear, 1 fully lit; with image=bound an EXR with the channels low and high"},
             {"headers",
              {{"ETag", header("a strong entity tag")},
               {"Server-Timing", header("stages with milliseconds")},
@@ -122,6 +122,12 @@ Json operation_of(const Route& route, const Options& options)
                               {"in", "query"},
                               {"description", "of a scene with a sequence of emission images, the number of one, from 1; needed there"},
                               {"schema", {{"type", "integer"}, {"minimum", 1}, {"maximum", max_frames}}}});
+        parameters.push_back(
+            {{"name", "image"},
+             {"in", "query"},
+             {"description", "`bound`: instead of the mask, the lowest and the highest visibility that each pixel can have, "
+                             "channels low and high, as image/x-exr; of a technique whose `bounds` is true"},
+             {"schema", {{"type", "string"}, {"enum", {"mask", "bound"}}, {"default", "mask"}}}});
     }
     if (!parameters.empty()) operation["parameters"] = parameters;
     if (route.method == "POST") operation["requestBody"] = body_of(route, options);

@@ -84,7 +84,7 @@ void Service::check_body_headers(const Request& request, const Route& route) con
     } else {
         boundary_of(type);
     }
-    if (route.answer == Answer::mask) negotiate(request.get_header_value("Accept"));
+    if (route.answer == Answer::mask) negotiate(request.get_header_value("Accept"), choice_of(request).image);
 }
 
 } // namespace penumbra::server

@@ -10,6 +10,7 @@
 
 #include "http/connection.hpp"
 #include "http/service.hpp"
+#include "masks/mask_choice.hpp"
 
 namespace penumbra::server {
 
@@ -37,5 +38,8 @@ inline std::optional<std::uint64_t> length_from(const std::string& text)
     if (text.empty() || error != std::errc{} || end != text.data() + text.size()) return {};
     return value;
 }
+
+// Which mask the query asks for. Throws Problem 400.
+inline MaskChoice choice_of(const httplib::Request& request) { return choice_from({request.params.begin(), request.params.end()}); }
 
 } // namespace penumbra::server

@@ -20,8 +20,6 @@ Problem no_scene()
     return Problem(404, "no_scene", "there is no scene of this id, or it is kept no longer; POST /v1/scenes keeps it again");
 }
 
-MaskChoice choice_of(const httplib::Request& request) { return choice_from({request.params.begin(), request.params.end()}); }
-
 // The id in the path, which the checks have looked at.
 std::string_view id_in(const httplib::Request& request)
 {
@@ -96,8 +94,8 @@ void Service::post_mask(const Request& request, Response& response)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
-    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
     const MaskChoice choice = choice_of(request);
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"), choice.image);
     const Body body = read_body(request);
     const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
     const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), choice, format); });
@@ -141,8 +139,8 @@ void Service::post_kept_mask(const Request& request, Response& response)
     const auto admitted = gate_.admit();
     const auto scene = scenes_.find(id_in(request), true);
     if (!scene) throw no_scene();
-    const MaskFormat& format = negotiate(request.get_header_value("Accept"));
     const MaskChoice choice = choice_of(request);
+    const MaskFormat& format = negotiate(request.get_header_value("Accept"), choice.image);
     const Body body = read_body(request);
     std::vector<Part> parts;
     std::string_view patch = body;

@@ -149,6 +149,7 @@ void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lig
         task.light_keys.push_back(std::move(keys));
     }
     task.job.combined = task.job.lights.size() > 1;
+    task.job.bound = choice.image == MaskImage::bound;
 }
 
 MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,

@@ -25,17 +25,27 @@ int frame_number(const std::string& text)
     return number;
 }
 
+MaskImage image_named(const std::string& text)
+{
+    if (text == "mask") return MaskImage::mask;
+    if (text == "bound") return MaskImage::bound;
+    throw Problem(400, "no_image", "image: is no image that a mask comes with; expected mask or bound in the query");
+}
+
 } // namespace
 
 MaskChoice choice_from(const std::vector<std::pair<std::string, std::string>>& query)
 {
     MaskChoice choice;
     for (const auto& [key, value] : query) {
-        if (key != "light" && key != "frame") throw Problem(400, "query", "the query has an unknown parameter; known: light, frame");
+        if (key != "light" && key != "frame" && key != "image")
+            throw Problem(400, "query", "the query has an unknown parameter; known: light, frame, image");
         if (std::ranges::count(query, key, [](const auto& parameter) { return parameter.first; }) > 1)
             throw Problem(400, "query", key + ": stands twice in the query");
         if (key == "frame") {
             choice.frame = frame_number(value);
+        } else if (key == "image") {
+            choice.image = image_named(value);
         } else {
             if (!is_name(value)) throw Problem(400, "no_light", "light: is no name; expected 1 to 64 of A-Z a-z 0-9 _ - in the query");
             choice.light = value;

@@ -1,4 +1,4 @@
-// Which of a scene's masks a request asks for: the light and frame of its query.
+// Which of a scene's masks a request asks for, and what of it: the light, frame and image of its query.
 #pragma once
 
 #include <string>
@@ -9,13 +9,17 @@
 
 namespace penumbra::server {
 
+// The images that a mask comes with: Mask::visibility and Mask::bound.
+enum class MaskImage { mask, bound };
+
 struct MaskChoice {
-    std::string light; // a light's name; empty: all together, or the only one
-    int frame = 0;     // of a sequence, from 1; 0: there is none
+    std::string light = {}; // a light's name; empty: all together, or the only one
+    int frame = 0;          // of a sequence, from 1; 0: there is none
+    MaskImage image = MaskImage::mask;
 };
 
-// From the query's parameters. Throws Problem 400 for others than light and frame, for one that stands twice, for what is no name and no
-// number.
+// From the query's parameters. Throws Problem 400 for others than light, frame and image, for one that stands twice, for what is no name,
+// no number and no image.
 MaskChoice choice_from(const std::vector<std::pair<std::string, std::string>>& query);
 
 // What of a light decides whether it can be chosen.

@@ -76,12 +76,19 @@ double weight_for(std::string_view accept, std::string_view type)
 
 std::span<const MaskFormat> mask_formats() { return formats; }
 
-const MaskFormat& negotiate(std::string_view accept)
+std::span<const MaskFormat> formats_of(MaskImage image)
 {
-    if (trimmed(accept).empty()) return formats.front();
+    if (image == MaskImage::mask) return formats;
+    return {std::ranges::find(formats, "exr", &MaskFormat::format), 1};
+}
+
+const MaskFormat& negotiate(std::string_view accept, MaskImage image)
+{
+    const std::span<const MaskFormat> offered = formats_of(image);
+    if (trimmed(accept).empty()) return offered.front();
     const MaskFormat* best = nullptr;
     double best_weight = 0;
-    for (const MaskFormat& format : formats) {
+    for (const MaskFormat& format : offered) {
         const double weight = weight_for(accept, format.media_type);
         if (weight <= best_weight) continue;
         best = &format;
@@ -89,7 +96,9 @@ const MaskFormat& negotiate(std::string_view accept)
     }
     if (best) return *best;
     std::string list;
-    for (const MaskFormat& format : formats) list += (list.empty() ? "" : ", ") + std::string(format.media_type);
+    for (const MaskFormat& format : offered) list += (list.empty() ? "" : ", ") + std::string(format.media_type);
+    if (image == MaskImage::bound)
+        throw Problem(406, "not_acceptable", "Accept: does not take EXR, and image=bound has two channels, low and high; expected " + list);
     throw Problem(406, "not_acceptable", "Accept: names no format of a mask; expected one of " + list);
 }
 

@@ -4,6 +4,8 @@
 #include <span>
 #include <string_view>
 
+#include "masks/mask_choice.hpp"
+
 namespace penumbra::server {
 
 struct MaskFormat {
@@ -11,7 +13,10 @@ struct MaskFormat {
 };
 std::span<const MaskFormat> mask_formats(); // the first is the default
 
-// By the Accept header (RFC 9110, 12.5.1); of equal weights the first format of mask_formats(). Throws Problem 406.
-const MaskFormat& negotiate(std::string_view accept);
+// Those that such an image is sent in, the first by default: bounds have two named channels, which only EXR holds.
+std::span<const MaskFormat> formats_of(MaskImage image);
+
+// By the Accept header (RFC 9110, 12.5.1); of equal weights the first format of formats_of(image). Throws Problem 406.
+const MaskFormat& negotiate(std::string_view accept, MaskImage image);
 
 } // namespace penumbra::server

@@ -23,11 +23,12 @@ std::string token_of(std::string_view name)
     return token;
 }
 
-// How a mask of that scene is encoded in that format.
+// How a mask of that scene, or its bound, is encoded in that format.
 OutputFormat encoding_of(const MaskTask& task, const MaskFormat& format)
 {
+    if (task.job.bound) return {.format = std::string(format.format), .bits = 32, .channels = {"low", "high"}};
     const std::string_view wanted = task.output.format == "tiff" ? std::string_view("tif") : std::string_view(task.output.format);
-    return {std::string(format.format), wanted == format.format ? task.output.bits : 0};
+    return {.format = std::string(format.format), .bits = wanted == format.format ? task.output.bits : 0};
 }
 
 // What a run of the task finds in its cache and leaves there.
@@ -116,6 +117,7 @@ MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Op
     for (const std::size_t i : chosen_from(task.job.lights, choice)) chosen.push_back(at_choice(task.job.lights[i], choice));
     task.job.lights = std::move(chosen);
     task.job.combined = task.job.lights.size() > 1;
+    task.job.bound = choice.image == MaskImage::bound;
     return task;
 }
 
@@ -135,7 +137,7 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
 
     deadline.check("encoding the mask");
     const auto encoding = Deadline::Clock::now();
-    const std::vector<std::byte> bytes = encode_image(mask.visibility, encoding_of(task, format));
+    const std::vector<std::byte> bytes = encode_image(task.job.bound ? mask.bound : mask.visibility, encoding_of(task, format));
     reply.bytes.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     reply.encode_ms = seconds_since(encoding) * 1000;
 
@@ -154,6 +156,7 @@ std::string etag_of(const Engine& engine, std::string_view content, const MaskCh
     digest.add(content)
         .add(choice.light)
         .add(std::to_string(choice.frame))
+        .add(choice.image == MaskImage::bound ? "bound" : "mask")
         .add(format.format)
         .add(version())
         .add(engine.device().name)

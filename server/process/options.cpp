@@ -53,7 +53,13 @@ const std::array rows{
               "receiver and part of the light",
               {1, std::int64_t{1} << 60},
               &Options::pairs},
-    OptionRow{"rays", "rays", "most rays of ray_traced and depth_trace: samples x receivers", {1, std::int64_t{1} << 60}, &Options::rays},
+    OptionRow{
+        "rays",
+        "rays",
+        "most rays of ray_traced and depth_trace: samples x receivers; for a bound 16 times as many with depth_trace, twice as many with "
+        "ray_traced",
+        {1, std::int64_t{1} << 60},
+        &Options::rays},
     OptionRow{"deadline-s",
               "seconds",
               "longest time from connection to result; checked while the body comes, in the queue and between stages",

@@ -30,6 +30,21 @@ protected:
         EXPECT_EQ(ran.code, 0) << ran.err;
         return path("depth/scene.json");
     }
+    // A camera's depth image under another light, of 256 x 256 pixels, and a picture of that size.
+    std::string write_relit_scene()
+    {
+        const Ran ran = penumbra({"depth", PENUMBRA_EXAMPLES "/04_relight_depth_view.json", "--out", path("view")});
+        EXPECT_EQ(ran.code, 0) << ran.err;
+        write_text(path("scene.json"), text_of(PENUMBRA_EXAMPLES "/04_relight_depth.json"));
+        return path("scene.json");
+    }
+    std::string write_picture()
+    {
+        Image picture{.width = 256, .height = 256, .channels = 3, .pixels = {}};
+        for (int i = 0; i < 256 * 256 * 3; ++i) picture.pixels.push_back(static_cast<float>(i % 251) / 250);
+        write_image(path("picture.png"), picture, {.format = "png", .bits = 8});
+        return path("picture.png");
+    }
     std::unique_ptr<ServerProgram> server;
 };
 
@@ -99,6 +114,47 @@ TEST_F(RemoteMaskCommand, FilesOfOneName)
     const Ran ran = remote({"mask", path("moved.json"), "-o", path("remote.pfm")});
     EXPECT_EQ(ran.code, 0) << ran.err;
     expect_same_bytes(path("local.pfm"), path("remote.pfm"));
+}
+
+TEST_F(RemoteMaskCommand, BoundAndPreviewAsHere)
+{
+    const std::string scene = write_relit_scene();
+    const auto with_all = [&](const std::string& name) {
+        return Arguments{"mask",   scene,           "-o",        path(name + ".pfm"),     "--bound", path(name + "-bound.exr"),
+                         "--over", write_picture(), "--preview", path(name + "-over.png")};
+    };
+    const Ran local = penumbra(with_all("local"));
+    EXPECT_EQ(local.code, 0) << local.err;
+    const Ran ran = remote(with_all("remote"));
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    for (const std::string name : {".pfm", "-bound.exr", "-over.png"}) expect_same_bytes(path("local" + name), path("remote" + name));
+    const Image bound = read_image(path("remote-bound.exr"));
+    EXPECT_EQ(bound.channels, 2);
+    EXPECT_LT(std::ranges::min(bound.pixels), 0.5f);
+}
+
+TEST_F(RemoteMaskCommand, NothingIsWrittenWhereBoundOrPreviewFail)
+{
+    const std::string scene = write_relit_scene();
+    const auto none_written = [&] {
+        return std::ranges::none_of(files(), [](const std::string& name) { return name.starts_with("mask") || name.starts_with("b."); });
+    };
+    // The library's words, here and there.
+    for (const bool there : {false, true}) {
+        const Arguments unbounded{"mask", scene, "-o", path("mask.pfm"), "--bound", path("b.exr"), "--technique", "soft_shadow_map"};
+        expect_one_error(there ? remote(unbounded) : penumbra(unbounded), 2, {"scene.json", "soft_shadow_map has no bounds"});
+        write_image(path("small.png"), Image{.width = 3, .height = 2, .channels = 3, .pixels = std::vector<float>(18, 1.f)},
+                    {.format = "png", .bits = 8});
+        const Arguments small{"mask", scene, "-o", path("mask.pfm"), "--over", path("small.png"), "--preview", path("mask.png")};
+        expect_one_error(there ? remote(small) : penumbra(small), 2, {"small.png: is 3 x 2", "256 x 256"});
+        const Arguments lost{"mask", scene, "-o", path("mask.pfm"), "--over", path("none.png"), "--preview", path("mask.png")};
+        expect_one_error(there ? remote(lost) : penumbra(lost), 2, {"none.png"});
+        EXPECT_TRUE(none_written());
+    }
+    // A service from before it had bounds.
+    FakeService old({problem(400, "query")});
+    expect_one_error(penumbra({"mask", scene, "-o", path("mask.pfm"), "--bound", path("b.exr"), "--server", old.url}), 2, {"the detail"});
+    EXPECT_TRUE(none_written());
 }
 
 TEST_F(RemoteMaskCommand, WhatTheServiceRefuses)

@@ -73,6 +73,23 @@ TEST(ClientRequest, ALightAndAFrame)
     EXPECT_TRUE(fake.requests[1].starts_with("POST /v1/masks?frame=1 HTTP/1.1\r\n")) << fake.requests[1].substr(0, 80);
 }
 
+TEST(ClientRequest, TheBoundOfAMask)
+{
+    const std::string type = "Content-Type: image/x-exr\r\n";
+    FakeService fake({answer(200, "first", type), answer(200, "second", type)});
+    const Client service(fake.url);
+    const Mask bound = service.mask(scene, {}, {.format = client::Format::exr, .image = client::MaskImage::bound});
+    EXPECT_EQ(bound.bytes, "first");
+    EXPECT_TRUE(bound.visibility.pixels.empty());
+    (void)service.mask(scene, {}, {.format = client::Format::exr, .light = "lamp", .image = client::MaskImage::bound});
+    EXPECT_THROW((void)service.mask(scene, {}, {.image = client::MaskImage::bound}), std::invalid_argument); // PFM holds no two channels
+    fake.finish();
+    ASSERT_EQ(fake.requests.size(), 2u);
+    EXPECT_TRUE(fake.requests[0].starts_with("POST /v1/masks?image=bound HTTP/1.1\r\n")) << fake.requests[0].substr(0, 80);
+    EXPECT_TRUE(holds(fake.requests[0], "Accept: image/x-exr\r\n"));
+    EXPECT_TRUE(fake.requests[1].starts_with("POST /v1/masks?light=lamp&image=bound HTTP/1.1\r\n")) << fake.requests[1].substr(0, 80);
+}
+
 TEST(ClientRequest, PreviousMaskStandsWhenNothingChanged)
 {
     FakeService fake({mask_answer("ETag: \"e\"\r\n"), answer(304), mask_answer("ETag: \"f\"\r\n"), answer(304)});

@@ -145,6 +145,17 @@ TEST(Image, PngSaysThatItIsLinear)
     EXPECT_NEAR(decode_image(encode_image(constant(1, 1, 0.5f), {"png", 16}), "x").pixels[0], 0.5, 0.5 / 65535 + 1e-7);
 }
 
+TEST(Image, PngSaysThatItIsSrgb)
+{
+    const Image image = ramp(4, 4, 3);
+    const std::vector<std::byte> bytes = encode_image(image, {.format = "png", .bits = 8, .srgb = true});
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    EXPECT_NE(text.find("sRGB"), std::string_view::npos);
+    EXPECT_EQ(text.substr(text.find("gAMA") + 4, 4), std::string_view("\x00\x00\xb1\x8f", 4)) << "45455 is 1 / 2.2";
+    // The samples are as they are without it.
+    EXPECT_EQ(decode_image(bytes, "x").pixels, decode_image(encode_image(image, {"png", 8}), "x").pixels);
+}
+
 TEST(Image, PngChecksumsAreChecked)
 {
     const std::vector<std::byte> whole = encode_image(ramp(5, 4, 3), {"png", 16});

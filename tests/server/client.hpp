@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -20,6 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include <penumbra/engine.hpp>
+#include <penumbra/scene_file.hpp>
 
 #include "http/service.hpp"
 #include "io/image_io.hpp"
@@ -168,6 +170,22 @@ inline Parts parts(const nlohmann::json& scene = scene_json())
             {"front.exr", text_of(encode_depth(occluder_depth()))},
             {"floor.exr", text_of(encode_depth(receiver_depth()))}};
 }
+
+// The parts as the library takes them.
+class PartResources final : public Resources {
+public:
+    explicit PartResources(Parts all) : all_(std::move(all)) {}
+    Bytes bytes(const std::string& name) const override
+    {
+        for (const auto& [known, text] : all_)
+            if (known == name) return Bytes(std::as_bytes(std::span(text)));
+        throw Error(ErrorCode::not_found, name);
+    }
+    std::string path(const std::string& name) const override { throw Error(ErrorCode::unsupported, name); }
+
+private:
+    Parts all_;
+};
 
 // --- The service -------------------------------------------------------------------------------------------------------------------
 

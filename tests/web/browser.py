@@ -6,10 +6,12 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import tempfile
 import time
 import unittest
+import zlib
 
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
@@ -18,6 +20,14 @@ from selenium.webdriver.chrome.service import Service
 OUT = pathlib.Path(os.environ.get("PENUMBRA_OUT", "."))
 EXAMPLES = pathlib.Path(os.environ["PENUMBRA_EXAMPLES"])
 WAIT_S = 30  # for one mask, on a machine that does other things too
+
+
+def png_bytes(width, height, colour):
+    """An 8-bit RGB PNG of colour(x, y)."""
+    rows = b"".join(b"\0" + bytes(value for x in range(width) for value in colour(x, y)) for y in range(height))
+    chunk = lambda name, data: struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
 class Server:

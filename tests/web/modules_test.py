@@ -193,7 +193,7 @@ class Modules(PageTest):
     def test_names_of_parts_are_those_that_the_service_takes(self):
         got = self.module(
             """
-            const {part_name, roles_of} = await page("source_panel");
+            const {part_name, roles_of} = await page("files");
             const roles = (...names) => Object.fromEntries(Object.entries(roles_of(names.map((name) => new File([], name)))).map(([k, v]) => [k, v.name]));
             return {names: [part_name("my depth (1).exr", "depth", []), part_name(".hidden.exr", "depth", []), part_name("scene", "depth", []),
                             part_name("...", "depth", []), part_name("a.exr", "back", ["a.exr"]), part_name("x".repeat(300), "d", [])],
@@ -205,6 +205,106 @@ class Modules(PageTest):
         self.assertEqual(got["two"], {"receiver": "floor.exr", "front": "front.exr"})
         self.assertEqual(got["three"], {"back": "z_back.exr", "front": "a.exr", "receiver": "b.exr"})
         self.assertEqual(got["one"], {"depth": "view.exr"})
+
+    def test_the_picture_is_told_from_depth(self):
+        got = self.module(
+            """
+            const {picture_among} = await page("files");
+            const jpeg = [0xff, 0xd8, 0xff, 0xe0], exr = [0x76, 0x2f, 0x31, 0x01];
+            const png = (bits, type) => [0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 0, 1, 0, 0, 0, 1, bits, type];
+            const heads = {jpeg, exr, rgb: png(8, 2), rgba: png(8, 6), palette: png(4, 3), grey: png(8, 0), grey16: png(16, 0), rgb16: png(16, 2), short: [0x89]};
+            const of = async (...names) => {
+                const files = names.map((name) => new File([Uint8Array.from(heads[name.split(":")[0]])], name.split(":")[1] ?? name));
+                try {
+                    const {depth, picture, look} = await picture_among(files);
+                    return [depth.map((file) => file.name).join(), picture?.name ?? "", look];
+                } catch (error) { return error.message; }
+            };
+            return {
+                jpeg: await of("jpeg", "exr"), first: await of("rgb", "grey16"), last: await of("grey", "rgba"), palette: await of("grey16", "palette"),
+                deep: await of("rgb16", "grey16"), none: await of("grey16", "exr"), beside: await of("rgb", "jpeg"),
+                named: await of("rgb:room.png", "rgb:room_depth.png"), turned: await of("rgb:disparity.png", "rgb:left.png"), unnamed: await of("rgb:a.png", "rgb:b.png"),
+                alone: await of("jpeg"), alone_png: await of("rgb:photo.png"), depth_png: await of("rgb:photo_depth.png"), short: await of("short"),
+                twice: await of("jpeg:a.jpg", "jpeg:b.jpg"),
+            };
+            """
+        )
+        jpeg, png = "JPEG", "PNG of 8-bit colours"
+        self.assertEqual(got["jpeg"], ["exr", "jpeg", jpeg])
+        self.assertEqual(got["first"], ["grey16", "rgb", png])
+        self.assertEqual(got["last"], ["grey", "rgba", png])
+        self.assertEqual(got["palette"], ["grey16", "palette", png])
+        self.assertEqual(got["deep"], ["rgb16,grey16", "", ""])
+        self.assertEqual(got["none"], ["grey16,exr", "", ""])
+        self.assertEqual(got["beside"], ["rgb", "jpeg", jpeg])
+        self.assertEqual(got["named"], ["room_depth.png", "room.png", png])
+        self.assertEqual(got["turned"], ["disparity.png", "left.png", png])
+        self.assertEqual(got["unnamed"], ["a.png", "b.png", png])
+        self.assertEqual(got["alone"], ["", "jpeg", jpeg])
+        self.assertEqual(got["alone_png"], ["", "photo.png", png])
+        self.assertEqual(got["depth_png"], ["photo_depth.png", "", ""])
+        self.assertEqual(got["short"], ["short", "", ""])
+        self.assertIn("a.jpg and b.jpg are pictures", got["twice"])
+
+    def test_a_picture_is_multiplied_in_linear_light(self):
+        # Every code under every share of the light: one pixel each.
+        got = self.module(
+            """
+            const {Picture} = await page("picture");
+            const codes = Array.from({length: 256}, (_, i) => i), shares = [0, 1e-4, 0.003, 0.1, 0.5, 0.9, 1];
+            const canvas = new OffscreenCanvas(256, shares.length), context = canvas.getContext("2d"), image = context.createImageData(256, shares.length);
+            for (let i = 0; i < image.data.length; i++) image.data[i] = i % 4 === 3 ? 255 : (i >> 2) % 256;
+            context.putImageData(image, 0, 0);
+            const picture = new Picture("codes.png", canvas.transferToImageBitmap());
+            const pixels = Float32Array.from({length: 256 * shares.length}, (_, i) => shares[i >> 8]);
+            const grey = {width: 256, height: shares.length, channels: 1, pixels};
+            const coloured = {...grey, channels: 3, pixels: Float32Array.from({length: 3 * pixels.length}, (_, i) => (i % 3 === 1 ? pixels[(i - 1) / 3] : 0))};
+            const fits = (width, height) => picture.fits({width, height});
+            return {shares, grey: [...picture.under(grey).data], coloured: [...picture.under(coloured).data].slice(-4),
+                    fits: [fits(512, 14), fits(258, 7), fits(260, 7)], said: picture.said_of({width: 300, height: 300})};
+            """
+        )
+        linear = lambda v: v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
+        encoded = lambda v: 12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055
+        for row, share in enumerate(got["shares"]):
+            for code in range(256):
+                pixel = got["grey"][4 * (256 * row + code):][:4]
+                expected = 255 * encoded(linear(code / 255) * share)
+                # The table's steps of linear light move by a twentieth of a code at most.
+                self.assertLess(abs(pixel[0] - expected), 0.56, (code, share))
+                self.assertEqual(pixel, [pixel[0]] * 3 + [255])
+        self.assertEqual(got["coloured"], [0, 255, 0, 255])  # each channel has its own share
+        self.assertEqual(got["fits"], [True, True, False])
+        for part in ("codes.png is 256 x 7", "300 x 300", "1 %"):
+            self.assertIn(part, got["said"])
+
+    def test_drafts_are_techniques_that_take_the_light(self):
+        got = self.module(
+            """
+            const {draft_of} = await page("technique_panel");
+            const one = (kind, lights) => ({kind, lights, schema: {properties: {sides: {enum: ["front", "both"], default: "both"}}}});
+            const techniques = [one("depth_trace", ["sphere"]), one("soft_shadow_map", ["rectangle"]), one("shadow_map", ["rectangle", "sphere"])];
+            const source = {drafts: ["soft_shadow_map", "shadow_map"], suggested: {sides: "front"}};
+            const of = (kind, light, from = source) => draft_of(techniques, {kind, settings: {}}, from, light);
+            return [of("depth_trace", "rectangle"), of("depth_trace", "sphere"), of("depth_trace", "point"), of("soft_shadow_map", "rectangle"),
+                    of("depth_trace", "rectangle", {...source, drafts: []})];
+            """
+        )
+        self.assertEqual(got, [{"kind": "soft_shadow_map", "settings": {"sides": "front"}}, {"kind": "shadow_map", "settings": {"sides": "front"}}, None, None, None])
+
+    def test_a_scene_is_kept_once_for_all_who_ask(self):
+        got = self.module(
+            """
+            const [{Client}, scenes] = await Promise.all(["client", "scene"].map(page));
+            const source = scenes.courtyard_source(), client = new Client();
+            const ask = (kind) => client.mask(scenes.scene_json(source, source.light, {kind, settings: {}}), source.files, "image/x-portable-floatmap");
+            const posted = () => performance.getEntriesByType("resource").filter((entry) => entry.name.endsWith("/v1/scenes")).length;
+            const before = posted();
+            await Promise.all([ask("shadow_map"), ask("soft_shadow_map")]);
+            return posted() - before;
+            """
+        )
+        self.assertEqual(got, 1)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
-"""The page as its user has it: open it, move the light, compare, drop depth maps."""
+"""The page as its user has it: open it, move the light, compare, drop depth maps and pictures."""
 
+import base64
 import json
 import re
 import time
 import unittest
 
-from browser import EXAMPLES, WAIT_S, PageTest, Server
+from browser import EXAMPLES, WAIT_S, PageTest, Server, png_bytes
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -256,6 +257,222 @@ class Page(PageTest):
                 self.assertLessEqual(taken, room, (width, mode))
             if width == 360:
                 self.screenshot("page_narrow_dark.png" if dark else "page_narrow.png")
+
+
+class Relit(PageTest):
+    """One camera's depth: drafts while the light moves, and its picture under the light."""
+
+    def setUp(self):
+        super().setUp()
+        view = self.folder / "view"
+        if not view.exists():
+            self.penumbra("depth", EXAMPLES / "04_relight_depth_view.json", "--out", view)
+        self.depth = view / "receiver.exr"
+
+    find, set_number, scene_file = Page.find, Page.set_number, Page.scene_file
+
+    def picture(self, name, width=256, height=256):
+        path = self.folder / name
+        path.write_bytes(png_bytes(width, height, lambda x, y: (x * 255 // width, y * 255 // height, 128)))
+        return path
+
+    def wait_for_trace(self):
+        self.wait_for("const d = document.getElementById('mask').dataset; return d.technique === 'depth_trace' && d.version")
+
+    def drop_and_trace(self, *paths):
+        self.change(lambda: self.drop(*paths))
+        self.wait_for_trace()
+
+    def watch(self):
+        """From now on, each technique and version that is shown."""
+        self.js(
+            """
+            const mask = document.getElementById("mask");
+            window.seen = [];
+            window.watcher?.disconnect();
+            window.watcher = new MutationObserver(() => {
+                const one = [mask.dataset.technique, Number(mask.dataset.version), document.getElementById("name_a").textContent];
+                if (String(window.seen.at(-1)) !== String(one)) window.seen.push(one);
+            });
+            window.watcher.observe(mask, {attributes: true, attributeFilter: ["data-version", "data-technique"]});
+            """
+        )
+
+    def drag_light(self):
+        pad = self.find("#light_pad")
+        ActionChains(self.browser, duration=60).move_to_element_with_offset(pad, -40, 20).click_and_hold().move_by_offset(30, -20).move_by_offset(
+            40, 30).move_by_offset(-20, 20).release().perform()
+
+    def delay(self, kind, seconds):
+        """From now on the page's requests for masks of this kind take longer: so that there is something to wait for, or to see."""
+        self.js(
+            """
+            const own = window.fetch, [kind, ms] = arguments;
+            window.fetch = async (path, init) => {
+                if (typeof init?.body === "string" && init.body.includes(`"${kind}"`)) await new Promise((then) => setTimeout(then, ms));
+                return own(path, init);
+            };
+            """,
+            kind,
+            1000 * seconds,
+        )
+
+    def test_a_draft_while_the_light_moves_and_the_trace_when_it_rests(self):
+        self.delay("depth_trace", 0.8)
+        self.drop_and_trace(self.depth)
+        self.assertEqual(Select(self.find("#technique_a [name=kind]")).first_selected_option.get_attribute("value"), "depth_trace")
+        self.assertTrue(self.find("#draft").is_selected() and self.find("#draft").is_displayed())
+        self.assertEqual(self.find("#name_a").text, "depth_trace")
+        self.assertEqual(self.scene_file()["technique"], {"kind": "depth_trace"})
+        rested = self.mask()
+        self.watch()
+        self.drag_light()
+        self.wait_for("return window.seen.length > 0 && window.seen.at(-1)[0] === 'depth_trace'")
+        time.sleep(0.5)  # more than the light has to rest: nothing comes after
+        seen = self.js("return window.seen")
+        self.assertEqual(seen[0][0], "soft_shadow_map", seen)
+        self.assertEqual(seen[-1][0], "depth_trace", seen)
+        versions = [version for _, version, _ in seen]
+        self.assertEqual(versions, sorted(versions), "no earlier mask takes the place of a later one")
+        self.assertEqual(versions[-1], max(versions))
+        self.assertNotEqual(rested["digest"], self.mask()["digest"])
+        # The drafts were called so.
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
+        self.assertIn("depth_trace", self.find("#name_a").text)
+        self.wait_for("return document.getElementById('name_a').textContent === 'depth_trace'")
+        self.assertEqual(self.problem(), "")
+
+    def test_the_label_says_that_it_is_a_draft(self):
+        self.delay("depth_trace", 1.5)
+        self.drop_and_trace(self.depth)
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
+        self.assertEqual(self.find("#name_a").text, "soft_shadow_map: draft; depth_trace when the light rests")
+        # A light that moves on is not kept waiting by the trace of where it was.
+        time.sleep(0.4)
+        before = self.js("return performance.now()")
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_DOWN))
+        self.assertLess(self.js("return performance.now()") - before, 1000)
+        self.wait_for_trace()
+
+    def test_no_draft_where_the_trace_is_as_quick(self):
+        self.delay("soft_shadow_map", 0.8)
+        self.drop_and_trace(self.depth)
+        self.watch()
+        self.drag_light()
+        time.sleep(0.5)
+        self.assertEqual({technique for technique, _, _ in self.js("return window.seen")}, {"depth_trace"})
+        self.assertEqual(self.find("#name_a").text, "depth_trace")
+
+    def test_drafts_can_be_switched_off(self):
+        self.delay("depth_trace", 0.8)
+        self.drop_and_trace(self.depth)
+        self.change(lambda: self.find("#draft").click())
+        self.watch()
+        self.drag_light()
+        time.sleep(2)
+        self.assertEqual({technique for technique, _, _ in self.js("return window.seen")}, {"depth_trace"})
+        # What is no trace has no draft, and neither has the courtyard.
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_map"))
+        self.assertFalse(self.find("#draft").is_displayed())
+        self.change(lambda: Select(self.find("[name=source]")).select_by_value("courtyard"))
+        self.assertEqual(Select(self.find("#technique_a [name=kind]")).first_selected_option.get_attribute("value"), "soft_shadow_map")
+        self.assertFalse(self.find("#name_a").is_displayed())
+
+    def test_a_sphere_has_a_draft_that_takes_it(self):
+        self.delay("depth_trace", 0.8)
+        self.drop_and_trace(self.depth)
+        self.watch()
+        self.change(lambda: Select(self.find("[name=light_kind]")).select_by_value("sphere"))
+        self.wait_for("return window.seen.length > 0 && window.seen.at(-1)[0] === 'depth_trace'")
+        self.assertEqual(self.js("return window.seen")[0][0], "shadow_map")
+        self.assertEqual(self.problem(), "")
+
+    def test_the_picture_under_the_light_as_the_command_line_makes_it(self):
+        photo = self.picture("photo.png")
+        self.drop_and_trace(photo, self.depth)
+        self.assertTrue(self.find("#shows [value=picture]").is_selected())
+        self.assertGreater(self.mask()["coloured"], 0.5)
+        self.assertIn("photo.png under this light alone", self.find("#picture_note").text)
+        self.assertIn("photo.png, a PNG of 8-bit colours: taken as the picture", self.find("#picture_said").text)
+        self.assertIn("--over 'photo.png' --preview preview.png", self.find("#penumbra_line").text)
+        scene = self.folder / "view" / "page.json"
+        scene.write_text(json.dumps(self.scene_file()))
+        preview = self.folder / "preview.png"
+        self.penumbra("mask", scene, "-o", self.folder / "mask.pfm", "--over", photo, "--preview", preview)
+        worst = self.module(
+            """
+            const bytes = Uint8Array.from(atob(given[0]), (c) => c.charCodeAt(0));
+            const bitmap = await createImageBitmap(new Blob([bytes]));
+            const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+            context.drawImage(bitmap, 0, 0);
+            const expected = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+            const canvas = document.getElementById("mask");
+            const shown = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+            return expected.length === shown.length ? shown.reduce((most, value, i) => Math.max(most, Math.abs(value - expected[i])), 0) : -1;
+            """,
+            base64.b64encode(preview.read_bytes()).decode(),
+        )
+        self.assertIn(worst, (0, 1))  # both round
+        # It follows the light, and gives way to the mask.
+        before = self.mask()["digest"]
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.SHIFT + Keys.ARROW_RIGHT))
+        self.wait_for_trace()
+        self.assertNotEqual(before, self.mask()["digest"])
+        self.js("document.querySelector('[name=shows][value=mask]').click()")
+        self.assertEqual(self.mask()["coloured"], 0)
+        self.assertFalse(self.find("#picture_note").is_displayed())
+
+    def test_a_picture_of_another_size_is_scaled_and_one_of_another_shape_refused(self):
+        self.drop_and_trace(self.depth, self.picture("large.png", 512, 510))
+        self.assertIn("It is 512 x 510, drawn at the mask's 256 x 256", self.find("#picture_note").text)
+        self.assertGreater(self.mask()["coloured"], 0.5)
+        self.assertNotIn("--over", self.find("#penumbra_line").text)
+        self.drop(self.picture("wide.png", 300, 200))
+        note = self.wait_for("const note = document.getElementById('picture_note'); return note.textContent.includes('wide.png') && note.textContent")
+        for part in ("300 x 200", "256 x 256", "1 %"):
+            self.assertIn(part, note)
+        self.assertFalse(self.find("#shows [value=picture]").is_enabled())
+        self.assertEqual(self.mask()["coloured"], 0)
+
+    def test_a_picture_by_itself_waits_for_its_depth(self):
+        jpeg = self.folder / "photo.jpg"
+        jpeg.write_bytes(base64.b64decode(self.module(
+            """
+            const canvas = Object.assign(document.createElement("canvas"), {width: 256, height: 256});
+            canvas.getContext("2d").fillStyle = "rgb(200 100 50)";
+            canvas.getContext("2d").fillRect(0, 0, 256, 256);
+            return canvas.toDataURL("image/jpeg").split(",")[1];
+            """)))
+        self.drop(jpeg)
+        self.wait_for("return !document.getElementById('problem').hidden")
+        self.assertIn("photo.jpg is taken as a picture, a JPEG. Its depth image is missing", self.problem())
+        self.drop_and_trace(self.depth)
+        self.assertEqual(self.problem(), "")
+        self.assertGreater(self.mask()["coloured"], 0.5)
+        # Another picture over the same depth leaves the light where it is.
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
+        self.wait_for_trace()
+        light = self.scene_file()["light"]
+        self.drop(self.picture("other.png"))
+        self.wait_for("return document.getElementById('picture_note').textContent.includes('other.png')")
+        self.assertEqual(self.scene_file()["light"], light)
+        # What was taken wrongly is swapped by hand: the service says what it thinks of this.
+        next(one for one in self.browser.find_elements(By.CSS_SELECTOR, "#source button") if one.text == "Swap picture and depth").click()
+        self.wait_for("return !document.getElementById('problem').hidden")
+        self.assertIn("other.png", self.problem() + self.find("#source").text)
+        self.console_errors()
+
+    def test_bounds_are_saved(self):
+        self.drop_and_trace(self.depth)
+        self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(self.folder)})
+        next(one for one in self.browser.find_elements(By.CSS_SELECTOR, "#share .buttons button") if one.text == "Bounds, EXR").click()
+        self.wait_for("return document.getElementById('said').textContent === 'bound.exr saved'")
+        end = time.monotonic() + WAIT_S
+        while not (self.folder / "bound.exr").exists() and time.monotonic() < end:
+            time.sleep(0.03)
+        self.assertEqual((self.folder / "bound.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_map"))
+        self.assertNotIn("Bounds, EXR", [one.text for one in self.browser.find_elements(By.CSS_SELECTOR, "#share .buttons button") if one.is_displayed()])
 
 
 class Token(PageTest):

@@ -83,7 +83,7 @@ class Client:
 
     def mask(self, scene: Mapping[str, Any], images: Optional[Mapping[str, ImageLike]] = None, *, format: str = "array",
              previous: Optional[Mask] = None, traceparent: Optional[str] = None, light_name: Optional[str] = None,
-             frame: Optional[int] = None) -> Mask:
+             frame: Optional[int] = None, image: str = "mask") -> Mask:
         """The mask of a scene (a dict of the scene file's form, docs/scene_file.md).
 
         images    by the names that the scene gives them: paths or bytes of EXR, PNG, TIFF or PFM files, or float arrays
@@ -94,9 +94,11 @@ class Client:
         light_name, frame
                   of a scene with `lights` one light's mask; without a name that of all together. Of a scene with a sequence of
                   emission images that frame, from 1; needed there.
+        image     "mask", or "bound": the lowest and the highest visibility that each pixel can have where depth images cast, an EXR
+                  with the channels low and high; needs format="exr"
         """
         body = form([("scene", _json(scene))] + encode_parts(images))
-        return self._mask("/v1/masks" + _query(light_name, frame), body, format, previous, traceparent)
+        return self._mask("/v1/masks" + _query(light_name, frame, image, format), body, format, previous, traceparent)
 
     def keep(self, scene: Mapping[str, Any], images: Optional[Mapping[str, ImageLike]] = None) -> "KeptScene":
         """Uploads a scene once, for many masks under changed lights, receivers or techniques."""
@@ -161,7 +163,7 @@ class KeptScene:
              receivers: Optional[Mapping[str, Any]] = None, technique: Optional[Mapping[str, Any]] = None,
              output: Optional[Mapping[str, Any]] = None, images: Optional[Mapping[str, ImageLike]] = None, format: str = "array",
              previous: Optional[Mask] = None, traceparent: Optional[str] = None, light_name: Optional[str] = None,
-             frame: Optional[int] = None) -> Mask:
+             frame: Optional[int] = None, image: str = "mask") -> Mask:
         """The mask of the kept scene with these sections changed, for this request only.
 
         Each section is merged into the kept one (JSON Merge Patch: keys replace, None removes a key); one with another `kind` replaces it,
@@ -170,7 +172,7 @@ class KeptScene:
         given = {"light": light, "lights": lights, "receivers": receivers, "technique": technique, "output": output}
         patch = _json({key: value for key, value in given.items() if value is not None})
         body: Body = form([("scene", patch)] + encode_parts(images)) if images else (patch, "application/merge-patch+json")
-        query = _query(light_name, frame)
+        query = _query(light_name, frame, image, format)
         try:
             return self._client._mask(f"/v1/scenes/{self.id}/masks{query}", body, format, previous, traceparent)
         except NotFound as error:
@@ -202,8 +204,12 @@ class KeptScene:
         self.warnings = [str(warning) for warning in kept.get("warnings", [])]
 
 
-def _query(light_name: Optional[str], frame: Optional[int]) -> str:
-    given = {"light": light_name, "frame": frame}
+def _query(light_name: Optional[str], frame: Optional[int], image: str, format: str) -> str:
+    if image not in ("mask", "bound"):
+        raise ValueError(f"image {image!r}: expected mask or bound")
+    if image == "bound" and format != "exr":
+        raise ValueError(f"image 'bound' has two named channels, expected format 'exr', not {format!r}")
+    given = {"light": light_name, "frame": frame, "image": image if image != "mask" else None}
     if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int) or frame < 1):
         raise ValueError(f"frame is {frame!r}, expected a number from 1")
     query = urllib.parse.urlencode({key: value for key, value in given.items() if value is not None})

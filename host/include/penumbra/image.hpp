@@ -39,6 +39,7 @@ struct OutputFormat {
     std::string format; // "exr", "tif", "png", "pfm", "hdr"; empty: by the file name's extension
     int bits = 0;       // 8 or 16 (png, tif: integers), 16 or 32 (exr, tif: floats); 0: png 16, tif 32, exr 32, pfm 32, hdr 32
     std::vector<std::string> channels = {}; // names of an EXR's; without them Y, A or R, G, B, A
+    bool srgb = false;                      // a PNG's samples, written as they stand, are sRGB, and it says so; else linear
 };
 
 // What an image file is by its first bytes: "exr", "tif", "png", "pfm", "hdr"; empty: none of them.

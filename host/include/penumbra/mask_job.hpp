@@ -35,7 +35,7 @@ struct MaskJob {
     Geometry geometry;
     Technique technique;
     std::vector<std::string> warnings = {}; // of the scene: they stand in front of those of each report
-    bool bound = false;                     // whether Mask::bound is wanted
+    bool bound = false;                     // whether Mask::bound is wanted; an error (unsupported) where the technique has none
     bool combined = false;                  // whether the mask of all lights together is wanted, after theirs
 };
 

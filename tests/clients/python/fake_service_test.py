@@ -50,6 +50,18 @@ class Requests(unittest.TestCase):
                          ["/v1/masks?light=lamp-1&frame=12", "/v1/masks?frame=1", "/v1/scenes", "/v1/scenes/ab12/masks?light=a"])
         self.assertEqual(json.loads(service.requests[3].body), {"lights": [{"name": "a"}]})
 
+    def test_the_bound_of_a_mask(self):
+        exr = mask_answer(b"an EXR", media_type="image/x-exr")
+        with FakeService(exr, kept(), exr) as service:
+            client = Client(service.url)
+            self.assertEqual(client.mask(SCENE, format="exr", image="bound").data, b"an EXR")
+            client.keep(SCENE).mask(format="exr", image="bound", light_name="a")
+            for wrong in ({"image": "bound"}, {"image": "bound", "format": "png"}, {"image": "low", "format": "exr"}):
+                with self.assertRaises(ValueError):
+                    client.mask(SCENE, **wrong)
+        self.assertEqual([request.path for request in service.requests],
+                         ["/v1/masks?image=bound", "/v1/scenes", "/v1/scenes/ab12/masks?light=a&image=bound"])
+
     def test_what_comes_back(self):
         headers = [("Server-Timing", 'queue;dur=0.5, decode;desc="x";dur=2, cdn-cache'), ("Penumbra-Warnings", '["a, b", "\\u00e4"]'),
                    ("ETag", '"sha256-1"')]

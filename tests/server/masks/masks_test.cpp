@@ -3,27 +3,11 @@
 #include <span>
 
 #include "io/image_io.hpp"
-#include <penumbra/scene_file.hpp>
 #include "masks/masks.hpp"
 #include "server/client.hpp"
 
 namespace penumbra::test {
 namespace {
-
-class PartResources final : public Resources {
-public:
-    explicit PartResources(Parts all) : all_(std::move(all)) {}
-    Bytes bytes(const std::string& name) const override
-    {
-        for (const auto& [known, text] : all_)
-            if (known == name) return Bytes(std::as_bytes(std::span(text)));
-        throw Error(ErrorCode::not_found, name);
-    }
-    std::string path(const std::string& name) const override { throw Error(ErrorCode::unsupported, name); }
-
-private:
-    Parts all_;
-};
 
 // What the library computes by itself from the same scene and images.
 Image library_mask(const Parts& all)
@@ -144,12 +128,16 @@ TEST(Masks, MeshesComeAsPartsWhereTheyAreAllowed)
 
 TEST(Negotiate, WeightsAndRanges)
 {
-    EXPECT_EQ(server::negotiate("").format, "png");
-    EXPECT_EQ(server::negotiate("*/*").format, "png");
-    EXPECT_EQ(server::negotiate("image/x-exr;q=0.9, image/tiff").format, "tif");
-    EXPECT_EQ(server::negotiate("IMAGE/PNG;q=0, image/*").format, "exr");
+    EXPECT_EQ(server::negotiate("", server::MaskImage::mask).format, "png");
+    EXPECT_EQ(server::negotiate("*/*", server::MaskImage::mask).format, "png");
+    EXPECT_EQ(server::negotiate("image/x-exr;q=0.9, image/tiff", server::MaskImage::mask).format, "tif");
+    EXPECT_EQ(server::negotiate("IMAGE/PNG;q=0, image/*", server::MaskImage::mask).format, "exr");
     for (const char* none : {"text/html", "image/png;q=0", "image/png;q=x", "image/jpeg, application/*", ";,;"})
-        EXPECT_THROW(server::negotiate(none), std::exception) << none;
+        EXPECT_THROW(server::negotiate(none, server::MaskImage::mask), std::exception) << none;
+    for (const char* taken : {"", "*/*", "image/*", "image/x-exr", "image/png, image/x-exr;q=0.1"})
+        EXPECT_EQ(server::negotiate(taken, server::MaskImage::bound).format, "exr") << taken;
+    for (const char* none : {"image/png", "image/tiff, image/x-exr;q=0"})
+        EXPECT_THROW(server::negotiate(none, server::MaskImage::bound), std::exception) << none;
 }
 
 } // namespace

@@ -26,9 +26,13 @@ namespace penumbra::client {
 
 enum class Format { pfm, exr, png, tiff };
 
+// The mask itself, or the lowest and the highest visibility that each pixel can have where depth images cast: two channels, low and high,
+// for which the format has to be exr.
+enum class MaskImage { mask, bound };
+
 struct Mask {
     Image visibility;  // where the format is pfm: linear, 1 fully lit, 0 umbra; 1 channel, 3 under a textured light
-    std::string bytes; // the file as the service sent it
+    std::string bytes; // the file as the service sent it: of the mask, or of its bound
     Format format = Format::pfm;
     std::vector<std::string> warnings;                     // what the service assumed or left out
     std::vector<std::pair<std::string, double>> stages_ms; // in the order they ran
@@ -41,6 +45,7 @@ struct MaskOptions {
     const Mask* previous = nullptr; // a mask from before: copied when the service says that the answer would be the same
     std::string light = {};         // of a scene with `lights`, the name of one; empty: all together
     int frame = 0;                  // of a scene with a sequence, its number from 1; 0: there is none
+    MaskImage image = MaskImage::mask;
 };
 
 namespace detail {
@@ -124,7 +129,7 @@ inline nlohmann::json json_from(const httplib::Response& answer)
     return json;
 }
 
-// "?light=NAME&frame=N", of what is asked for.
+// "?light=NAME&frame=N&image=bound", of what is asked for.
 inline std::string query_of(const MaskOptions& options)
 {
     const auto fits = [](char c) {
@@ -132,8 +137,11 @@ inline std::string query_of(const MaskOptions& options)
     };
     if (!std::ranges::all_of(options.light, fits)) throw std::invalid_argument("light: expected a name of A-Z a-z 0-9 _ -");
     if (options.frame < 0) throw std::invalid_argument("frame: is " + std::to_string(options.frame) + ", expected 1 or more");
+    if (options.image == MaskImage::bound && options.format != Format::exr)
+        throw std::invalid_argument("image: bound has two named channels, expected format exr");
     std::string query = options.light.empty() ? std::string() : "?light=" + options.light;
     if (options.frame > 0) query += (query.empty() ? "?frame=" : "&frame=") + std::to_string(options.frame);
+    if (options.image == MaskImage::bound) query += query.empty() ? "?image=bound" : "&image=bound";
     return query;
 }
 
