@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 #include <penumbra/error.hpp>
 
@@ -110,17 +111,38 @@ LightDepth depth_of(const Light& light, const Occluders& occluders, const std::v
     return depth;
 }
 
-// Without ground, as long as there is anything else.
-std::vector<const TriangleMesh*> casting_meshes(const Geometry& geometry, const LeftOut& left_out)
-{
-    std::vector<const TriangleMesh*> meshes, all;
-    for (const Object& object : geometry.objects()) {
-        if (!object.casts || object.seen) continue;
-        all.push_back(&object.mesh);
-        if (!in_ground(left_out.grounds, object.mesh)) meshes.push_back(&object.mesh);
+// The meshes that cast, without ground as long as there is anything else.
+class CastingMeshes {
+public:
+    CastingMeshes(const Geometry& geometry, const LeftOut& left_out)
+    {
+        std::vector<const TriangleMesh*> all;
+        for (const Object& object : geometry.objects()) {
+            if (!object.casts || object.seen) continue;
+            all.push_back(&object.mesh);
+            if (const TriangleMesh* mesh = without(left_out.grounds, object.mesh)) meshes_.push_back(mesh);
+        }
+        if (meshes_.empty()) meshes_ = std::move(all);
     }
-    return meshes.empty() ? all : meshes;
-}
+    const std::vector<const TriangleMesh*>& meshes() const { return meshes_; }
+
+private:
+    // The mesh, or what is left of it; null where all of it is ground.
+    const TriangleMesh* without(const std::vector<Ground>& grounds, const TriangleMesh& mesh)
+    {
+        if (grounds.empty()) return &mesh;
+        std::vector<std::array<std::uint32_t, 3>> left;
+        for (const auto& triangle : mesh.triangles)
+            if (!in_ground(grounds, mesh, triangle)) left.push_back(triangle);
+        if (left.size() == mesh.triangles.size()) return &mesh;
+        if (left.empty()) return nullptr;
+        parts_.push_back({mesh.positions, std::move(left)});
+        return &parts_.back();
+    }
+
+    std::deque<TriangleMesh> parts_;
+    std::vector<const TriangleMesh*> meshes_;
+};
 
 // Ends the work and notes in the state what it took.
 void finish_prepare(opencl::Work& work, Prepared::State& state)
@@ -238,9 +260,10 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     const bool maps = needs.front || needs.back;
     const LeftOut left_out = left_out_of(light, geometry.objects(), needs, receivers);
     state->grounds = left_out.grounds;
+    const CastingMeshes meshes(geometry, left_out);
     Casting casting{.light = state->light,
                     .depth = {},
-                    .meshes = by_view ? std::vector<const TriangleMesh*>{} : casting_meshes(geometry, left_out),
+                    .meshes = by_view ? std::vector<const TriangleMesh*>{} : meshes.meshes(),
                     .topology = [&] { return objects.topology(); },
                     .tracer = [&] { return objects.casters(); },
                     .images = {}};

@@ -83,6 +83,16 @@ void warn_of_counts(const Prepared::State& state, const ShadeCounts& counts, Rep
             " receivers see part of the light past the occluder map's border: what is not on the map casts no shadow on them");
 }
 
+// A bulb shines in every direction; ours shines to one side, and what lies on the other counts as lit.
+void warn_of_dark_side(const Light& light, const Receivers& receivers, const Camera& camera, Report& report)
+{
+    if (!std::holds_alternative<PointLight>(light) && !std::holds_alternative<SphereLight>(light)) return;
+    const LightFrame frame = light_frame(light);
+    const Ground plane{.normal = frame.direction, .offset = frame.direction.dot(frame.origin)};
+    if (shows_behind({plane}, *receivers.depth, camera))
+        report.warnings.push_back("receivers lie behind the " + kind_of(light) + " light, which shines to one side: they count as lit; turn its direction towards them");
+}
+
 // The technique's own step.
 void shade_technique(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, Shaded& shaded)
 {
@@ -178,6 +188,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     if (shows_behind(state.grounds, *receivers.depth, camera))
         mask.report.warnings.emplace_back("receivers lie behind ground that the occluder map was not fitted to: prepared for other receivers, it may miss "
                                           "what casts on these");
+    warn_of_dark_side(state.light, receivers, camera, mask.report);
     ShadeCounts counts;
     Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .bound = bound ? &mask.bound : nullptr};
     shade_technique(work, state, receiving, shaded);
