@@ -154,13 +154,13 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
 
     const Stopwatch total;
-    // Techniques that trace depth images clip the light sample by sample.
-    const bool traces_images = needs_of(state.technique).depth_images;
     const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.context);
     const double fit_ms = total.ms();
     Mask mask{.visibility = {}, .report = report_of(state, receivers.width, receivers.height)};
     opencl::Work work(state.context);
-    const opencl::Buffer<DepthVector> normals = traces_images ? opencl::Buffer<DepthVector>() : upload_normals(work, receivers, surface.get());
+    // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
+    const bool clips = !(needs_of(state.technique).depth_images && surface) && !row_of(mask.report.technique).on_host;
+    const opencl::Buffer<DepthVector> normals = clips ? upload_normals(work, receivers, surface.get()) : opencl::Buffer<DepthVector>();
     const Receiving receiving{.camera = camera,
                               .width = receivers.width,
                               .height = receivers.height,
