@@ -32,7 +32,7 @@ BUNNY = "/usr/share/glmark2/models/bunny.obj"
 QUICK = ("clean", "noise 1e-3", "16-bit window")
 
 
-# Scenes: objects, camera, light, and the tangent of half the view of the light's map, which holds all that casts.
+# Scenes: objects, camera, light.
 
 
 def box(low, high):
@@ -64,8 +64,8 @@ def write_mesh(path, bodies):
 
 
 def ground(center, half_u, half_v):
-    """A floor or a wall. Nothing lies behind it, so it does not cast."""
-    return {"quad": {"center": center, "half_u": half_u, "half_v": half_v}, "casts": False}
+    """A floor or a wall."""
+    return {"quad": {"center": center, "half_u": half_u, "half_v": half_v}}
 
 
 def lamp(center, target, half):
@@ -83,7 +83,7 @@ def looking(eye, target, degrees):
 def bunny(_):
     foot = min(float(line.split()[2]) for line in open(BUNNY) if line.startswith("v "))
     objects = [{"mesh": BUNNY, "translate": [0, -foot, 0]}, ground([0, 0, 0], [24, 0, 0], [0, 0, -24])]
-    return objects, looking([-0.6, 3.4, 4.6], [0.3, 0.6, 0], 30), lamp([-3, 4.5, 2.5], [0, 0.6, 0], 0.4), 0.3
+    return objects, looking([-0.6, 3.4, 4.6], [0.3, 0.6, 0], 30), lamp([-3, 4.5, 2.5], [0, 0.6, 0], 0.4)
 
 
 def room(folder):
@@ -91,7 +91,7 @@ def room(folder):
     write_mesh(folder / "table.obj", [box((-1, 0.95, -0.6), (1, 1.05, 0.6)), ball((0.35, 1.4, 0), 0.35)] + legs)
     objects = [{"mesh": "table.obj"}, ground([0, 0, 0], [6, 0, 0], [0, 0, -6]),
                ground([0, 3, -2], [6, 0, 0], [0, 3, 0]), ground([-2.4, 3, 0], [0, 0, -6], [0, 3, 0])]
-    return objects, looking([2.6, 2.7, 4.6], [-0.3, 0.8, -0.3], 40), lamp([1.8, 4, 2.6], [0, 0.8, -0.2], 0.35), 0.45
+    return objects, looking([2.6, 2.7, 4.6], [-0.3, 0.8, -0.3], 40), lamp([1.8, 4, 2.6], [0, 0.8, -0.2], 0.35)
 
 
 SCENES = {"bunny": bunny, "room": room}
@@ -208,9 +208,9 @@ def prepared(name, program, out):
     folder = out / name
     folder.mkdir(parents=True, exist_ok=True)
     study = Study(program, folder)
-    objects, camera, light, tangent = SCENES[name](folder)
+    objects, camera, light = SCENES[name](folder)
     scene = {"penumbra": 1, "light": light, "objects": objects,
-             "occluders": {"camera": {"kind": "light", "tan_half_fov": tangent}, "resolution": [512, 512]},
+             "occluders": {"resolution": [512, 512]},
              "receivers": {"camera": camera, "resolution": [WIDTH, HEIGHT]}}
     finer = dict(scene, receivers={"camera": camera, "resolution": [FINE * WIDTH, FINE * HEIGHT]})
     study.must("mask", "truth", scene, "-o", "truth.exr", "--technique", "ray_traced", "--set", "samples=1024")
@@ -230,8 +230,7 @@ def view_of(study, camera, name, pixels, kind, encoding):
 
 
 def relit(scene, view):
-    """Maps of a depth image are fitted to it."""
-    return dict(scene, objects=[view], receivers=view, occluders={"resolution": [512, 512]})
+    return dict(scene, objects=[view], receivers=view)
 
 
 def measure(name, given):

@@ -18,7 +18,7 @@ Key tangents(bool required)
             .type = Pair{},
             .meaning = "tangents of the half angles",
             .required = required,
-            .otherwise = required ? "" : "fitted to the objects",
+            .otherwise = required ? "" : "fitted: of occluders to what casts, but for flat ground; else to the objects",
             .example = "[0.5, 0.5]"};
 }
 
@@ -40,13 +40,13 @@ Form sun_camera()
                       .type = Pair{},
                       .meaning = "half the width and height",
                       .unit = "length",
-                      .otherwise = "fitted to the objects",
+                      .otherwise = "fitted: of occluders to what casts, but for flat ground; else to the objects",
                       .example = "[4, 4]"},
                      {.name = "center",
                       .type = Numbers{3},
                       .meaning = "the middle of the image plane, from which depth counts",
                       .unit = "length",
-                      .otherwise = "fitted to the objects; the origin without any",
+                      .otherwise = "fitted as half_extent is; the origin without objects",
                       .example = "[0, 9, 0]"}}};
 }
 
