@@ -151,6 +151,16 @@ void say_quality(Prepared::State& state, const Geometry& geometry)
     }
 }
 
+// What traces meshes or sees their depth goes through what is cut out of them; what works on their edges or slices does not.
+void warn_of_cut_outs(Prepared::State& state, const Needs& needs, const Casting& casting, const Geometry& geometry)
+{
+    if (needs.casters == Needs::Casters::unused || needs.depth_images || casting.meshes.empty()) return;
+    for (const Object& object : geometry.objects())
+        if (object.casts && object.mesh.cut_outs)
+            state.warnings.push_back(object.name + " has materials that cut it out, which " + std::string(kind_of(state.technique)) +
+                                     " takes as whole: ray_traced and techniques of depth maps do not");
+}
+
 PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechnique& before, const Light& light)
 {
     const auto call = [&](const auto& prepared) -> PreparedTechnique {
@@ -253,6 +263,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, shown);
 
     prepare_technique(*state, casting);
+    warn_of_cut_outs(*state, needs, casting, geometry);
     say_quality(*state, geometry);
     state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view));
     if (needs.receivers_from_light && objects.any(&Object::receives)) state->receiver_geometry = geometry;

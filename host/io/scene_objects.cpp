@@ -1,12 +1,15 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 
+#include "io/image_io.hpp"
 #include "io/mesh_io.hpp"
 #include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "scene/camera.hpp"
+#include "scene/placement.hpp"
 
 namespace penumbra {
 
@@ -36,19 +39,6 @@ Error with_names(const Error& error, const std::string& path, const std::string&
     return {error.code(), std::move(message), error.hint()};
 }
 
-TriangleMesh read_mesh_file(const JsonValue& name, const Resources& resources)
-{
-    const std::string file = name.text();
-    return under(name, [&] {
-        const std::string path = resources.path(file);
-        try {
-            return read_mesh(path, file);
-        } catch (const Error& error) {
-            throw with_names(error, path, file);
-        }
-    });
-}
-
 SeenSurface read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
                                 std::vector<std::string>& warnings)
 {
@@ -66,20 +56,6 @@ SeenSurface read_depth_surface(const JsonObject& section, const Light& light, co
     return {.depth = std::move(map), .camera = camera, .thickness = given_thickness ? thickness->number() : 0};
 }
 
-// Scale, then rotations about X, Y and Z, then translation.
-struct Placement {
-    double scale;
-    Vec3 cosine, sine, translation;
-
-    Vec3 turned(Vec3 p) const
-    {
-        p = {p.x, cosine.x * p.y - sine.x * p.z, sine.x * p.y + cosine.x * p.z};
-        p = {cosine.y * p.x + sine.y * p.z, p.y, cosine.y * p.z - sine.y * p.x};
-        return {cosine.z * p.x - sine.z * p.y, sine.z * p.x + cosine.z * p.y, p.z};
-    }
-    Vec3 placed(const Vec3& p) const { return turned(p * scale) + translation; }
-};
-
 Placement placement_of(const JsonObject& section)
 {
     const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
@@ -88,6 +64,29 @@ Placement placement_of(const JsonObject& section)
             .cosine = {std::cos(r.x), std::cos(r.y), std::cos(r.z)},
             .sine = {std::sin(r.x), std::sin(r.y), std::sin(r.z)},
             .translation = translate ? translate->vec3() : Vec3(0, 0, 0)};
+}
+
+// Files that a mesh names lie where it lies: beside it, or among the parts of the request.
+TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resources, std::vector<std::string>& warnings)
+{
+    const JsonValue name = section.need("mesh");
+    const std::string file = name.text();
+    const auto weld = section.find("weld");
+    MeshOptions options{.placement = placement_of(section), .weld = weld ? weld->number() : 0, .companion = {}};
+    options.max_samples = resources.max_samples();
+    options.warnings = &warnings;
+    options.companion = [&](const std::string& other) {
+        const std::string beside = (std::filesystem::path(file).parent_path() / other).string();
+        return Bytes(read_file(resources.path(beside), beside));
+    };
+    return under(name, [&] {
+        const std::string path = resources.path(file);
+        try {
+            return read_mesh(path, file, options);
+        } catch (const Error& error) {
+            throw with_names(error, path, file);
+        }
+    });
 }
 
 void place(TriangleMesh& mesh, const JsonObject& section)
@@ -140,8 +139,12 @@ penumbra::Object parse_object(const JsonValue& value, const Light& light, const 
         place(*object.seen, section);
     } else {
         object.name = section.has("mesh") ? section.need("mesh").text() : "quad";
-        object.mesh = section.has("mesh") ? read_mesh_file(section.need("mesh"), resources) : read_quad(section.need("quad"));
-        place(object.mesh, section);
+        if (section.has("mesh")) {
+            object.mesh = read_mesh_file(section, resources, warnings);
+        } else {
+            object.mesh = read_quad(section.need("quad"));
+            place(object.mesh, section);
+        }
     }
     return object;
 }

@@ -260,6 +260,9 @@ PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoot
     work.stage("topology");
     if (casting.meshes.empty() && settings.silhouettes == SilhouetteSource::object)
         findings.warnings.emplace_back("there are no objects that cast: silhouettes are those of the depth map (silhouettes image)");
+    const bool cut_out = std::ranges::any_of(casting.meshes, [](const TriangleMesh* mesh) { return mesh->cut_outs != nullptr; });
+    if (cut_out && settings.silhouettes == SilhouetteSource::object)
+        findings.warnings.emplace_back("materials cut casters out: silhouettes are those of their whole triangles (silhouettes image has the others)");
     const std::shared_ptr<const Topology> topology = topology_of(casting, settings);
     work.moved(topology->bytes());
 
