@@ -26,7 +26,7 @@ std::string short_number(double number)
     return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number, std::chars_format::general, 2).ptr};
 }
 
-void place(PolygonSoup& soup, const Placement& placement, std::string_view where)
+void place(PolygonSoup& soup, const ObjectPlacement& placement, std::string_view where)
 {
     constexpr double largest = std::numeric_limits<float>::max();
     for (Vec3& p : soup.positions) {
@@ -141,7 +141,7 @@ void warn_of_cracks(const TriangleMesh& mesh, const MeshSource& source)
 
 } // namespace
 
-TriangleMesh build_mesh(PolygonSoup soup, const Placement& placement, double weld, const MeshSource& source)
+TriangleMesh build_mesh(PolygonSoup soup, const ObjectPlacement& placement, double weld, const MeshSource& source)
 {
     place(soup, placement, source.where);
     Builder builder(soup, source.where);

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "io/polygon_soup.hpp"
-#include "scene/placement.hpp"
+#include "scene/object_placement.hpp"
 
 namespace penumbra {
 
@@ -12,6 +12,6 @@ namespace penumbra {
 // units) those that are no further apart, which is said in a warning, as are cracks that are left. Points, lines and triangles that collapse go;
 // points and lines are warned of. Throws invalid_input for positions that are not finite, are beyond float32 once placed, or give no
 // triangles, and too_large.
-TriangleMesh build_mesh(PolygonSoup soup, const Placement& placement, double weld, const MeshSource& source);
+TriangleMesh build_mesh(PolygonSoup soup, const ObjectPlacement& placement, double weld, const MeshSource& source);
 
 } // namespace penumbra

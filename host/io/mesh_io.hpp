@@ -10,12 +10,12 @@
 #include <penumbra/scene.hpp>
 #include <penumbra/scene_file.hpp>
 
-#include "scene/placement.hpp"
+#include "scene/object_placement.hpp"
 
 namespace penumbra {
 
 struct MeshOptions {
-    Placement placement;
+    ObjectPlacement placement;
     double weld = 0;                                          // vertices no further apart are joined, scene units
     std::function<Bytes(const std::string& name)> companion;  // files that it names, relative to it; without one they lie beside it
     std::uint64_t max_samples = std::uint64_t{1} << 30;       // of an image that cuts it out

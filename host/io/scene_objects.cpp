@@ -9,7 +9,7 @@
 #include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "scene/camera.hpp"
-#include "scene/placement.hpp"
+#include "scene/object_placement.hpp"
 
 namespace penumbra {
 
@@ -56,7 +56,7 @@ SeenSurface read_depth_surface(const JsonObject& section, const Light& light, co
     return {.depth = std::move(map), .camera = camera, .thickness = given_thickness ? thickness->number() : 0};
 }
 
-Placement placement_of(const JsonObject& section)
+ObjectPlacement placement_of(const JsonObject& section)
 {
     const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
     const Vec3 r = rotate ? rotate->vec3() * (std::numbers::pi / 180) : Vec3(0, 0, 0);
@@ -91,7 +91,7 @@ TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resource
 
 void place(TriangleMesh& mesh, const JsonObject& section)
 {
-    const Placement placement = placement_of(section);
+    const ObjectPlacement placement = placement_of(section);
     for (Imath::V3f& position : mesh.positions) {
         position = Imath::V3f(placement.placed(Vec3(position)));
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
@@ -102,7 +102,7 @@ void place(TriangleMesh& mesh, const JsonObject& section)
 // The camera moves with its surfaces and its depth grows with the scale; `thickness` is a length in the scene already.
 void place(SeenSurface& seen, const JsonObject& section)
 {
-    const Placement placement = placement_of(section);
+    const ObjectPlacement placement = placement_of(section);
     Frame& frame = seen.camera.frame;
     frame = {.origin = placement.placed(frame.origin), .x = placement.turned(frame.x), .y = placement.turned(frame.y), .z = placement.turned(frame.z)};
     if (placement.scale == 1) return;

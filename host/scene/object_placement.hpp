@@ -5,7 +5,7 @@
 
 namespace penumbra {
 
-struct Placement {
+struct ObjectPlacement {
     double scale = 1;
     Vec3 cosine{1, 1, 1}, sine{0, 0, 0}; // of the angle about each axis
     Vec3 translation{0, 0, 0};
