@@ -7,19 +7,14 @@
 #include <assimp/importerdesc.h>
 #include <assimp/scene.h>
 
+#include "io/words.hpp"
+
 namespace penumbra {
 
 namespace {
 
 // Deeper node trees are broken files (or loops).
 constexpr int max_nodes_deep = 1000;
-
-std::string one_line(std::string text)
-{
-    std::ranges::replace_if(
-        text, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, ' ');
-    return text.substr(0, 200);
-}
 
 // Leaves one loader, so that no content can reach the dozens of others.
 void keep_only(Assimp::Importer& importer, std::string_view name)

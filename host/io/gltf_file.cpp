@@ -177,7 +177,7 @@ GltfFile open_gltf(std::span<const std::byte> bytes, const MeshSource& source)
     std::string error, warning;
     if (!reader.LoadASCIIFromString(&file.model, &error, &warning, text.data(), static_cast<unsigned>(text.size()), "")) {
         error.resize(std::min(error.find('\n'), error.size()));
-        throw file.broken("cannot be read as glTF: " + error);
+        throw file.broken("cannot be read as glTF: " + one_line(std::move(error)));
     }
     return file;
 }

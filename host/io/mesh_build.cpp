@@ -93,12 +93,24 @@ private:
     {
         Triangle triangle;
         for (std::size_t k = 0; k < 3; ++k) triangle[k] = vertex_[soup_.corners[first + corners[k]]];
-        if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) return;
+        if (is_collapsed(triangle, corners, first)) return;
         mesh_.triangles.push_back(triangle);
         if (soup_.cut.empty()) return;
         cuts_.image.push_back(soup_.cut[polygon]);
         cuts_.texture.push_back(
             {soup_.texture[first + corners[0]], soup_.texture[first + corners[1]], soup_.texture[first + corners[2]]});
+    }
+
+    // Whether two corners are one in the file, or were joined. What only float32 makes one stays, for the techniques to warn of.
+    bool is_collapsed(const Triangle& triangle, const Triangle& corners, std::size_t first) const
+    {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t next = (k + 1) % 3;
+            if (triangle[k] != triangle[next]) continue;
+            const auto at = [&](std::size_t corner) { return soup_.positions[soup_.corners[first + corners[corner]]]; };
+            if (joined_ > 0 || at(k) == at(next)) return true;
+        }
+        return false;
     }
 
     // Vertices that no triangle uses (points, lines, collapsed triangles) would count in bounds.

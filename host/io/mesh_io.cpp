@@ -15,6 +15,7 @@
 #include "io/obj.hpp"
 #include "io/ply.hpp"
 #include "io/stl.hpp"
+#include "io/words.hpp"
 
 namespace penumbra {
 
@@ -46,13 +47,6 @@ const Format& format_of(const std::string& path, std::string_view where)
         throw Error(ErrorCode::unsupported, std::string(where) + " has a format that is not read",
                     "meshes: .obj, .ply, .stl, .3ds, .gltf (version 2), .glb");
     return *found;
-}
-
-std::string one_line(std::string text)
-{
-    std::ranges::replace_if(
-        text, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, ' ');
-    return text.substr(0, 200);
 }
 
 // Files that the mesh names, beside it.

@@ -43,15 +43,15 @@ private:
     bool next_line(std::string_view& line, std::string& joined)
     {
         if (rest_.empty()) return false;
-        line = one_line();
+        line = text_line();
         if (!line.ends_with('\\')) return true;
         joined.clear();
-        for (; line.ends_with('\\') && !rest_.empty(); line = one_line()) joined.append(line.substr(0, line.size() - 1)).push_back(' ');
+        for (; line.ends_with('\\') && !rest_.empty(); line = text_line()) joined.append(line.substr(0, line.size() - 1)).push_back(' ');
         joined.append(line);
         line = joined;
         return true;
     }
-    std::string_view one_line()
+    std::string_view text_line()
     {
         ++number_;
         const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
@@ -89,8 +89,9 @@ private:
         const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), index);
         const auto all = static_cast<std::int64_t>(count);
         const std::int64_t from_0 = index < 0 ? all + index : index - 1;
-        if (error != std::errc() || end != word.data() + word.size() || from_0 < 0 || from_0 >= all)
-            throw fail(std::string("has a face with ") + what + " " + std::string(word.substr(0, 24)) + " of " + std::to_string(count));
+        if (error != std::errc() || end != word.data() + word.size()) throw fail(std::string("has a face with ") + what + " " + in_quotes(word));
+        if (from_0 < 0 || from_0 >= all)
+            throw fail(std::string("has a face with ") + what + " " + std::to_string(index) + " of " + std::to_string(count));
         return static_cast<std::uint32_t>(from_0);
     }
 

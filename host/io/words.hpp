@@ -1,8 +1,10 @@
 // Words and numbers of text formats (PLY, OBJ, STL), whatever the locale.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace penumbra {
@@ -46,6 +48,15 @@ inline bool is_word(std::string_view word, std::string_view lower)
         if (c != lower[i]) return false;
     }
     return true;
+}
+
+// Another program's message in one of ours: one line of ASCII, cut when long.
+inline std::string one_line(std::string text)
+{
+    text.resize(std::min<std::size_t>(text.size(), 200));
+    for (char& c : text)
+        if (c < 0x20 || c > 0x7e) c = ' ';
+    return text;
 }
 
 } // namespace penumbra

@@ -52,10 +52,11 @@ TEST(Obj, ErrorsNameTheLine)
     says(corners + "f 1 2 4\n", "line 4 has a face with vertex 4 of 3");
     says(corners + "f 1 2 0\n", "line 4 has a face with vertex 0 of 3");
     says(corners + "f 1 2 -4\n", "line 4 has a face with vertex -4 of 3");
-    says(corners + "f 1 2 x\n", "line 4 has a face with vertex x of 3");
+    says(corners + "f 1 2 x\n", "line 4 has a face with vertex \"x\"");
+    says(corners + "f 1 2 \xff\n", "line 4 has a face with vertex \"\\ufffd\"");
     says("v 1 2\n", "line 1 has a vertex without three numbers");
     says("\nv 1,5 2 3\n", "line 2 has a vertex without three numbers");
-    says(corners + "f 1 2 99999999999999999999\n", "vertex 99999999999999999999 of 3");
+    says(corners + "f 1 2 99999999999999999999\n", "vertex \"99999999999999999999\"");
 }
 
 TEST(Obj, OpacityMapsCutOut)
