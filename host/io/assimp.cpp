@@ -43,7 +43,8 @@ void append(const aiMesh& source, const aiMatrix4x4& world_from_mesh, std::strin
         corners.clear();
         for (unsigned k = 0; k < face.mNumIndices; ++k) {
             if (face.mIndices[k] >= source.mNumVertices)
-                throw broken_mesh(where, "has a face with vertex " + std::to_string(face.mIndices[k]) + " of " + std::to_string(source.mNumVertices));
+                throw broken_mesh(where, "has a face with vertex " + std::to_string(face.mIndices[k]) + " of " +
+                                             std::to_string(source.mNumVertices));
             corners.push_back(first + face.mIndices[k]);
         }
         if (mirrored) std::ranges::reverse(corners);

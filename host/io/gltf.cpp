@@ -36,7 +36,8 @@ public:
         for (const int node : nodes_.shown)
             if (file_.model.nodes[static_cast<std::size_t>(node)].mesh >= 0) read_node(node);
         if (materials_.blended() > 0)
-            file_.source.warn("has " + std::to_string(materials_.blended()) + " primitives that are blended (alphaMode BLEND): they cast as a whole");
+            file_.source.warn("has " + std::to_string(materials_.blended()) +
+                              " primitives that are blended (alphaMode BLEND): they cast as a whole");
         return std::move(soup_);
     }
 

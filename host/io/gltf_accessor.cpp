@@ -115,11 +115,13 @@ private:
 
     Component component(int type) const
     {
-        if ((type < 5120 || type > 5123) && type != 5125 && type != 5126) throw fail("has the unknown componentType " + std::to_string(type));
+        if ((type < 5120 || type > 5123) && type != 5125 && type != 5126)
+            throw fail("has the unknown componentType " + std::to_string(type));
         return static_cast<Component>(type);
     }
 
-    std::vector<double> elements(int view, std::size_t offset, std::size_t stride, std::size_t count, Component type, std::size_t width) const
+    std::vector<double> elements(int view, std::size_t offset, std::size_t stride, std::size_t count, Component type,
+                                 std::size_t width) const
     {
         const std::span<const std::byte> bytes = view_bytes(file_, view);
         const std::size_t step = size_of(type), element = step * width;
@@ -144,7 +146,8 @@ private:
         if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0) throw fail("has negative numbers in sparse");
         const auto count = static_cast<std::size_t>(sparse.count);
         const Component type = component(sparse.indices.componentType);
-        if (type != Component::uint8 && type != Component::uint16 && type != Component::uint32) throw fail("has sparse indices that are signed");
+        if (type != Component::uint8 && type != Component::uint16 && type != Component::uint32)
+            throw fail("has sparse indices that are signed");
         const std::vector<double> at =
             elements(sparse.indices.bufferView, static_cast<std::size_t>(sparse.indices.byteOffset), 0, count, type, 1);
         const std::vector<double> values =
@@ -153,7 +156,8 @@ private:
             const auto place = static_cast<std::size_t>(at[i]);
             if (place >= accessor_.count)
                 throw fail("replaces element " + std::to_string(place) + " of " + std::to_string(accessor_.count) + " (sparse)");
-            std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * width_), width_, numbers.begin() + static_cast<std::ptrdiff_t>(place * width_));
+            std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * width_), width_,
+                        numbers.begin() + static_cast<std::ptrdiff_t>(place * width_));
         }
     }
 

@@ -8,8 +8,8 @@
 
 namespace penumbra {
 
-// The numbers of an accessor whose type has `width` of them, one element after the other: strides and sparse replacements followed, integers
-// divided by their range when they are normalised. Throws invalid_input unless they lie in their buffers.
+// The numbers of an accessor whose type has `width` of them, one element after the other: strides and sparse replacements followed,
+// integers divided by their range when they are normalised. Throws invalid_input unless they lie in their buffers.
 std::vector<double> read_numbers(const GltfFile& file, int accessor, int width);
 
 // The same for one number an element, which must be an integer.

@@ -21,10 +21,22 @@ constexpr int most_nested = 100;
 
 // What a file may require: the first four are read; the others change how surfaces look and none of their places.
 constexpr std::array<std::string_view, 16> known_extensions{
-    "KHR_mesh_quantization",      "EXT_mesh_gpu_instancing", "KHR_texture_transform",   "KHR_node_visibility",
-    "KHR_lights_punctual",        "KHR_materials_unlit",     "KHR_materials_clearcoat", "KHR_materials_sheen",
-    "KHR_materials_specular",     "KHR_materials_ior",       "KHR_materials_iridescence", "KHR_materials_anisotropy",
-    "KHR_materials_emissive_strength", "KHR_materials_transmission", "KHR_materials_volume", "KHR_materials_dispersion",
+    "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
+    "KHR_texture_transform",
+    "KHR_node_visibility",
+    "KHR_lights_punctual",
+    "KHR_materials_unlit",
+    "KHR_materials_clearcoat",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_anisotropy",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_materials_dispersion",
 };
 
 struct Parts {
@@ -50,14 +62,16 @@ Parts parts_of(std::span<const std::byte> bytes, std::string_view where)
         throw Error(ErrorCode::unsupported, std::string(where) + " is GLB of version " + std::to_string(version), "glTF 2 is read");
     const std::size_t length = little_32(bytes, 8);
     if (length > bytes.size())
-        throw broken_mesh(where, "is truncated: its GLB header counts " + std::to_string(length) + " bytes, there are " + std::to_string(bytes.size()));
+        throw broken_mesh(where, "is truncated: its GLB header counts " + std::to_string(length) + " bytes, there are " +
+                                     std::to_string(bytes.size()));
 
     Parts parts;
     for (std::size_t at = 12; at + 8 <= length;) {
         const std::size_t size = little_32(bytes, at);
         const std::uint32_t type = little_32(bytes, at + 4);
         const bool first = at == 12;
-        if (size > length - at - 8) throw broken_mesh(where, "has a GLB chunk of " + std::to_string(size) + " bytes that reaches beyond the file");
+        if (size > length - at - 8)
+            throw broken_mesh(where, "has a GLB chunk of " + std::to_string(size) + " bytes that reaches beyond the file");
         const std::span<const std::byte> chunk = bytes.subspan(at + 8, size);
         if (first != (type == 0x4e4f534a)) throw broken_mesh(where, "has GLB chunks in another order than JSON, then others");
         if (first) parts.json = text_of(chunk);
@@ -90,7 +104,8 @@ Json parsed(std::string_view text, std::string_view where)
     const Json version = asset != json.end() && asset->is_object() ? asset->value("version", Json()) : Json();
     if (!version.is_string()) throw broken_mesh(where, "is not glTF 2: it has no asset.version");
     if (!version.get_ref<const std::string&>().starts_with("2."))
-        throw Error(ErrorCode::invalid_input, std::string(where) + " is glTF " + in_quotes(version.get_ref<const std::string&>()), "version 2 is read");
+        throw Error(ErrorCode::invalid_input, std::string(where) + " is glTF " + in_quotes(version.get_ref<const std::string&>()),
+                    "version 2 is read");
     return json;
 }
 
@@ -145,7 +160,8 @@ Bytes read_buffer(const Json& entry, std::size_t place, const Parts& parts, cons
     Bytes bytes = inside ? Bytes(*parts.binary) : bytes_at(uri, what, source);
     const std::span<const std::byte> all = bytes;
     if (all.size() < needed)
-        throw broken_mesh(source.where, "is truncated: " + what + " has " + std::to_string(all.size()) + " bytes, expected " + std::to_string(needed));
+        throw broken_mesh(source.where,
+                          "is truncated: " + what + " has " + std::to_string(all.size()) + " bytes, expected " + std::to_string(needed));
     return bytes;
 }
 

@@ -62,7 +62,9 @@ std::uint32_t GltfMaterials::cut_of(int index)
     if (!is_new) return known->second;
     const tinygltf::Material& material = file_.model.materials[static_cast<std::size_t>(index)];
     const tinygltf::Texture& texture = file_.entry(file_.model.textures, material.pbrMetallicRoughness.baseColorTexture.index, "textures");
-    if (texture.source < 0) throw Error(ErrorCode::unsupported, std::string(file_.source.where) + " has a cut-out whose texture has no image that is read", "PNG or JPEG");
+    if (texture.source < 0)
+        throw Error(ErrorCode::unsupported, std::string(file_.source.where) + " has a cut-out whose texture has no image that is read",
+                    "PNG or JPEG");
 
     const std::string name = std::string(file_.source.where) + ": images[" + std::to_string(texture.source) + "]";
     auto alpha = cut_image(image_bytes(file_, texture.source), name, AlphaOf::alpha, file_.source.max_samples);
@@ -97,7 +99,8 @@ bool GltfMaterials::cut(const tinygltf::Primitive& primitive, GltfPrimitive& par
     if (part.cut == not_cut) return alpha_factor(material) >= material.alphaCutoff;
     const std::vector<double> numbers = read_numbers(file_, coordinates->second, 2);
     if (numbers.size() != 2 * part.positions.size())
-        throw file_.broken("has texture coordinates for " + std::to_string(numbers.size() / 2) + " of " + std::to_string(part.positions.size()) + " vertices");
+        throw file_.broken("has texture coordinates for " + std::to_string(numbers.size() / 2) + " of " +
+                           std::to_string(part.positions.size()) + " vertices");
     for (std::size_t i = 0; i < numbers.size(); i += 2) part.texture.push_back(view(numbers[i], numbers[i + 1]));
     return true;
 }

@@ -89,7 +89,8 @@ std::vector<int> scene_roots(const GltfFile& file, const std::vector<int>& paren
     const std::vector<int>& listed = file.entry(model.scenes, std::max(model.defaultScene, 0), "scenes").nodes;
     std::vector<bool> seen(parents.size());
     for (const int root : listed) {
-        if (file.entry(parents, root, "nodes") >= 0) throw file.broken("has a scene with nodes[" + std::to_string(root) + "], which has a parent");
+        if (file.entry(parents, root, "nodes") >= 0)
+            throw file.broken("has a scene with nodes[" + std::to_string(root) + "], which has a parent");
         if (seen[static_cast<std::size_t>(root)]) throw file.broken("has a scene with nodes[" + std::to_string(root) + "] twice");
         seen[static_cast<std::size_t>(root)] = true;
     }
@@ -97,14 +98,16 @@ std::vector<int> scene_roots(const GltfFile& file, const std::vector<int>& paren
 }
 
 // An attribute of the instances: `width` numbers each, all of one count; empty without it.
-std::vector<double> instance_numbers(const GltfFile& file, const tinygltf::Value& attributes, const char* name, int width, std::size_t& count)
+std::vector<double> instance_numbers(const GltfFile& file, const tinygltf::Value& attributes, const char* name, int width,
+                                     std::size_t& count)
 {
     if (!attributes.Has(name)) return {};
     const tinygltf::Value& index = attributes.Get(name);
     if (!index.IsInt()) throw file.broken(std::string("has instances whose ") + name + " is no accessor");
     std::vector<double> numbers = read_numbers(file, index.Get<int>(), width);
     const std::size_t own = numbers.size() / static_cast<std::size_t>(width);
-    if (count != 0 && count != own) throw file.broken("has instances of " + std::to_string(count) + " and " + std::to_string(own) + " places");
+    if (count != 0 && count != own)
+        throw file.broken("has instances of " + std::to_string(count) + " and " + std::to_string(own) + " places");
     count = own;
     return numbers;
 }
@@ -155,7 +158,8 @@ std::vector<M44d> places_of(const GltfFile& file, int index, const M44d& world)
     };
     std::vector<M44d> places;
     places.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) places.push_back(from_trs(part(translation, i, 3), part(rotation, i, 4), part(scale, i, 3)) * world);
+    for (std::size_t i = 0; i < count; ++i)
+        places.push_back(from_trs(part(translation, i, 3), part(rotation, i, 4), part(scale, i, 3)) * world);
     return places;
 }
 

@@ -23,14 +23,16 @@ std::vector<Vec3> read_points(const GltfFile& file, int accessor)
     return points;
 }
 
-void add_targets(const GltfFile& file, const tinygltf::Primitive& primitive, const std::vector<double>& weights, std::vector<Vec3>& positions)
+void add_targets(const GltfFile& file, const tinygltf::Primitive& primitive, const std::vector<double>& weights,
+                 std::vector<Vec3>& positions)
 {
     for (std::size_t t = 0; t < std::min(primitive.targets.size(), weights.size()); ++t) {
         const int accessor = attribute(primitive.targets[t], "POSITION");
         if (accessor < 0 || weights[t] == 0) continue;
         const std::vector<Vec3> moves = read_points(file, accessor);
         if (moves.size() != positions.size())
-            throw file.broken("has a morph target of " + std::to_string(moves.size()) + " vertices for " + std::to_string(positions.size()));
+            throw file.broken("has a morph target of " + std::to_string(moves.size()) + " vertices for " +
+                              std::to_string(positions.size()));
         for (std::size_t i = 0; i < moves.size(); ++i) positions[i] += moves[i] * weights[t];
     }
 }

@@ -13,8 +13,8 @@ namespace penumbra {
 struct GltfPrimitive {
     std::vector<Vec3> positions; // morph targets added
     std::vector<std::array<std::uint32_t, 3>> triangles;
-    std::uint32_t cut = not_cut;      // of the soup's
-    std::vector<Imath::V2f> texture;  // of each vertex, when it is cut out
+    std::uint32_t cut = not_cut;     // of the soup's
+    std::vector<Imath::V2f> texture; // of each vertex, when it is cut out
     std::size_t lines = 0;           // 1: it is points or lines, and there are no triangles
 };
 

@@ -16,7 +16,8 @@ std::vector<M44d> joint_places(const GltfFile& file, const tinygltf::Skin& skin,
     std::vector<double> bind;
     if (skin.inverseBindMatrices >= 0) bind = read_numbers(file, skin.inverseBindMatrices, 16);
     if (!bind.empty() && bind.size() < 16 * skin.joints.size())
-        throw file.broken("has a skin of " + std::to_string(skin.joints.size()) + " joints with " + std::to_string(bind.size() / 16) + " matrices");
+        throw file.broken("has a skin of " + std::to_string(skin.joints.size()) + " joints with " + std::to_string(bind.size() / 16) +
+                          " matrices");
     std::vector<M44d> places;
     for (std::size_t i = 0; i < skin.joints.size(); ++i) {
         M44d place;
@@ -34,7 +35,8 @@ int set_of(const tinygltf::Primitive& primitive, const char* name, int set)
 
 } // namespace
 
-std::vector<M44d> skin_places(const GltfFile& file, const tinygltf::Primitive& primitive, int skin, const GltfNodes& nodes, std::size_t vertices)
+std::vector<M44d> skin_places(const GltfFile& file, const tinygltf::Primitive& primitive, int skin, const GltfNodes& nodes,
+                              std::size_t vertices)
 {
     const std::vector<M44d> joints = joint_places(file, file.entry(file.model.skins, skin, "skins"), nodes);
     std::vector<M44d> places(vertices, M44d(0.0)); // all sixteen numbers

@@ -97,8 +97,7 @@ private:
         mesh_.triangles.push_back(triangle);
         if (soup_.cut.empty()) return;
         cuts_.image.push_back(soup_.cut[polygon]);
-        cuts_.texture.push_back(
-            {soup_.texture[first + corners[0]], soup_.texture[first + corners[1]], soup_.texture[first + corners[2]]});
+        cuts_.texture.push_back({soup_.texture[first + corners[0]], soup_.texture[first + corners[1]], soup_.texture[first + corners[2]]});
     }
 
     // Whether two corners are one in the file, or were joined. What only float32 makes one stays, for the techniques to warn of.
@@ -161,7 +160,8 @@ TriangleMesh build_mesh(PolygonSoup soup, const ObjectPlacement& placement, doub
     if (mesh.triangles.empty()) throw broken_mesh(source.where, "has no triangles");
     if (builder.lines() > 0) source.warn("has " + std::to_string(builder.lines()) + " points and lines: they cast nothing");
     if (builder.joined() > 0)
-        source.warn("has " + std::to_string(builder.joined()) + " vertices that were joined with others within " + short_number(weld) + " (weld)");
+        source.warn("has " + std::to_string(builder.joined()) + " vertices that were joined with others within " + short_number(weld) +
+                    " (weld)");
     warn_of_cracks(mesh, source);
     return mesh;
 }

@@ -16,10 +16,10 @@ namespace penumbra {
 
 struct MeshOptions {
     ObjectPlacement placement;
-    double weld = 0;                                          // vertices no further apart are joined, scene units
-    std::function<Bytes(const std::string& name)> companion;  // files that it names, relative to it; without one they lie beside it
-    std::uint64_t max_samples = std::uint64_t{1} << 30;       // of an image that cuts it out
-    std::vector<std::string>* warnings = nullptr;             // what was left out or looks wrong, each starting with `where`
+    double weld = 0;                                         // vertices no further apart are joined, scene units
+    std::function<Bytes(const std::string& name)> companion; // files that it names, relative to it; without one they lie beside it
+    std::uint64_t max_samples = std::uint64_t{1} << 30;      // of an image that cuts it out
+    std::vector<std::string>* warnings = nullptr;            // what was left out or looks wrong, each starting with `where`
 };
 
 // All triangles of the file, node transforms applied, placed, vertices at equal positions joined (mesh_build.hpp). Throws not_found,

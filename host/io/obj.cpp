@@ -89,7 +89,8 @@ private:
         const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), index);
         const auto all = static_cast<std::int64_t>(count);
         const std::int64_t from_0 = index < 0 ? all + index : index - 1;
-        if (error != std::errc() || end != word.data() + word.size()) throw fail(std::string("has a face with ") + what + " " + in_quotes(word));
+        if (error != std::errc() || end != word.data() + word.size())
+            throw fail(std::string("has a face with ") + what + " " + in_quotes(word));
         if (from_0 < 0 || from_0 >= all)
             throw fail(std::string("has a face with ") + what + " " + std::to_string(index) + " of " + std::to_string(count));
         return static_cast<std::uint32_t>(from_0);
@@ -179,7 +180,7 @@ private:
     std::vector<Imath::V2f> texture_;
     std::map<std::string, OpacityMap, std::less<>> materials_;
     std::map<std::string, std::uint32_t> cuts_;
-    const OpacityMap* map_ = nullptr;  // of the material in use
+    const OpacityMap* map_ = nullptr; // of the material in use
     std::uint32_t cut_ = not_cut;
     std::vector<std::uint32_t> corners_;
     std::vector<Imath::V2f> mapped_;

@@ -10,9 +10,9 @@
 
 namespace penumbra {
 
-// v, vt, f (indices from 1, or from the end when negative), l and p, usemtl, mtllib, and lines that a backslash continues; what else there is
-// (normals, groups, curves) is skipped. Materials matter for their map_d alone: a library that is not there is warned of. Throws invalid_input,
-// messages with the line's number.
+// v, vt, f (indices from 1, or from the end when negative), l and p, usemtl, mtllib, and lines that a backslash continues; what else there
+// is (normals, groups, curves) is skipped. Materials matter for their map_d alone: a library that is not there is warned of. Throws
+// invalid_input, messages with the line's number.
 PolygonSoup decode_obj(std::span<const std::byte> bytes, const MeshSource& source);
 
 // A map_d of a material library (MTL): which image, and how the texture coordinates lead to it.

@@ -38,7 +38,8 @@ std::vector<Vec2> flattened(std::span<const Vec3> corners)
 // Some corners by where they lie: a grid of about as many cells as corners.
 class Grid {
 public:
-    explicit Grid(const std::vector<Vec2>& points) : side_(static_cast<std::size_t>(std::sqrt(static_cast<double>(points.size()))) + 1), cells_(side_ * side_)
+    explicit Grid(const std::vector<Vec2>& points)
+        : side_(static_cast<std::size_t>(std::sqrt(static_cast<double>(points.size()))) + 1), cells_(side_ * side_)
     {
         for (const Vec2& p : points) box_.extendBy(p);
     }
@@ -74,7 +75,8 @@ class Clipper {
 public:
     using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-    Clipper(std::vector<Vec2> points, Triangles& triangles) : p_(std::move(points)), grid_(p_), next_(p_.size()), before_(p_.size()), out_(triangles)
+    Clipper(std::vector<Vec2> points, Triangles& triangles)
+        : p_(std::move(points)), grid_(p_), next_(p_.size()), before_(p_.size()), out_(triangles)
     {
         const auto count = static_cast<std::uint32_t>(p_.size());
         for (std::uint32_t i = 0; i < count; ++i) next_[i] = (i + 1) % count, before_[i] = (i + count - 1) % count;
@@ -89,8 +91,8 @@ public:
         std::size_t left = p_.size();
         std::uint32_t corner = 1;
         while (left > 3) {
-            // Once around by the strict rule. Where edges lie on each other it may find nothing: then what only touches an ear is let be, and at
-            // last corners without area go.
+            // Once around by the strict rule. Where edges lie on each other it may find nothing: then what only touches an ear is let be,
+            // and at last corners without area go.
             const auto found = find(corner, left, [&](std::uint32_t i) { return is_ear(i, true); });
             const auto ear = found != none ? found : find(corner, left, [&](std::uint32_t i) { return is_ear(i, false); });
             const auto flat = ear != none ? ear : find(corner, left, [&](std::uint32_t i) { return at(i) == 0; });

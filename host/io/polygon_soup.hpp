@@ -28,8 +28,8 @@ struct PolygonSoup {
     std::size_t lines = 0;              // points and lines that were left out
 
     // What is cut out; the first two are empty when nothing is.
-    std::vector<std::uint32_t> cut;     // of each polygon: one of `cuts`, or not_cut
-    std::vector<Imath::V2f> texture;    // of each corner: (0, 0) is the image's top left corner, (1, 1) the bottom right one
+    std::vector<std::uint32_t> cut;  // of each polygon: one of `cuts`, or not_cut
+    std::vector<Imath::V2f> texture; // of each corner: (0, 0) is the image's top left corner, (1, 1) the bottom right one
     std::vector<CutOut> cuts;
 
     void add(std::span<const std::uint32_t> polygon);

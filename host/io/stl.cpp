@@ -47,7 +47,8 @@ PolygonSoup decode_binary(std::string_view bytes, std::string_view where)
     return soup;
 }
 
-// Words count, not lines: (facet normal x y z, outer loop, vertex x y z three times, endloop, endfacet) endsolid; but for the name after solid.
+// Words count, not lines: (facet normal x y z, outer loop, vertex x y z three times, endloop, endfacet) endsolid; but for the name after
+// solid.
 PolygonSoup decode_text(std::string_view text, std::string_view where)
 {
     PolygonSoup soup;

@@ -13,7 +13,8 @@ std::string percent_decoded(std::string_view uri);
 
 bool is_data_uri(std::string_view uri);
 
-// The bytes of a "data:[TYPE];base64,..." (RFC 2397, RFC 4648, with or without = at the end) or of one in percent encoding; nothing when it is broken.
+// The bytes of a "data:[TYPE];base64,..." (RFC 2397, RFC 4648, with or without = at the end) or of one in percent encoding; nothing when it
+// is broken.
 std::optional<std::vector<std::byte>> data_of(std::string_view uri);
 
 } // namespace penumbra

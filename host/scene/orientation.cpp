@@ -41,8 +41,8 @@ struct Expansion {
 
 double turn(const Vec2& a, const Vec2& b, const Vec2& c)
 {
-    // Four differences, two products and their difference: off by at most (3 + 16 u) u of the sum of magnitudes (Shewchuk's ccwerrboundA), with
-    // u = 2^-53.
+    // Four differences, two products and their difference: off by at most (3 + 16 u) u of the sum of magnitudes (Shewchuk's ccwerrboundA),
+    // with u = 2^-53.
     const double left = (a.x - c.x) * (b.y - c.y), right = (a.y - c.y) * (b.x - c.x);
     const double fast = left - right;
     if (std::abs(fast) > (3 + 16 * 0x1p-53) * 0x1p-53 * (std::abs(left) + std::abs(right))) return fast;

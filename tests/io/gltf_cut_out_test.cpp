@@ -27,7 +27,9 @@ Gltf leaf(const json& material)
     return gltf;
 }
 
-const json mask = {{"alphaMode", "MASK"}, {"alphaCutoff", 0.25}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {1, 1, 1, 0.5}}}}};
+const json mask = {{"alphaMode", "MASK"},
+                   {"alphaCutoff", 0.25},
+                   {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {1, 1, 1, 0.5}}}}};
 
 } // namespace
 

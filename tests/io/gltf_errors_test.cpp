@@ -85,11 +85,12 @@ TEST(GltfErrors, BrokenContainers)
     };
     const std::string glb = sound().glb();
     for (std::size_t size = 0; size < glb.size(); size += 7) EXPECT_EQ(code(glb.substr(0, size)), ErrorCode::invalid_input) << size;
-    for (const char* text : {"", "{", "[]", "null", "{}", R"({"asset": 1})", R"({"asset": []})", R"({"asset": {"version": "2.0"}, "buffers": 3})",
-                             R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4}]})",
-                             R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4, "uri": "data:;base64,AAA="}]})",
-                             R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "data:;base64,A*=="}]})",
-                             R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": -3, "uri": "data:;base64,AAAA"}]})"})
+    for (const char* text :
+         {"", "{", "[]", "null", "{}", R"({"asset": 1})", R"({"asset": []})", R"({"asset": {"version": "2.0"}, "buffers": 3})",
+          R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4}]})",
+          R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4, "uri": "data:;base64,AAA="}]})",
+          R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "data:;base64,A*=="}]})",
+          R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": -3, "uri": "data:;base64,AAAA"}]})"})
         EXPECT_EQ(code(text), ErrorCode::invalid_input) << text;
     std::string version = glb;
     version[4] = 1;

@@ -32,8 +32,11 @@ public:
     // `count` 0: as many elements as there are numbers for.
     template <class Number> int accessor(const std::vector<Number>& numbers, const char* type, bool normalized = false)
     {
-        const std::size_t width = std::string(type) == "SCALAR" ? 1 : std::string(type) == "MAT4" ? 16 : static_cast<std::size_t>(type[3] - '0');
-        json accessor = {{"bufferView", view(numbers)}, {"componentType", component<Number>()}, {"count", numbers.size() / width}, {"type", type}};
+        const std::size_t width = std::string(type) == "SCALAR" ? 1
+                                  : std::string(type) == "MAT4" ? 16
+                                                                : static_cast<std::size_t>(type[3] - '0');
+        json accessor = {
+            {"bufferView", view(numbers)}, {"componentType", component<Number>()}, {"count", numbers.size() / width}, {"type", type}};
         if (normalized) accessor["normalized"] = true;
         return push("accessors", accessor);
     }
@@ -71,8 +74,8 @@ public:
             const auto little = static_cast<std::uint32_t>(n);
             return std::string(reinterpret_cast<const char*>(&little), 4);
         };
-        return "glTF" + number(2) + number(12 + 8 + head.size() + 8 + tail.size()) + number(head.size()) + "JSON" + head + number(tail.size()) +
-               std::string("BIN\0", 4) + tail;
+        return "glTF" + number(2) + number(12 + 8 + head.size() + 8 + tail.size()) + number(head.size()) + "JSON" + head +
+               number(tail.size()) + std::string("BIN\0", 4) + tail;
     }
     // Its polygons, with `more` files beside it.
     PolygonSoup read(std::map<std::string, std::string> more = {}, std::vector<std::string>* warnings = nullptr) const

@@ -36,7 +36,8 @@ TEST(Gltf, BuffersAreBesideInsideOrInTheText)
     // 36 bytes, whatever the type that the URI gives.
     const std::string base64 = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
     for (const char* type : {"application/octet-stream", "application/gltf-buffer", "application/x-other", ""})
-        EXPECT_EQ(read_mesh(folder.write("a.gltf", gltf.text("data:" + std::string(type) + ";base64," + base64)), "a").triangles.size(), 1u);
+        EXPECT_EQ(read_mesh(folder.write("a.gltf", gltf.text("data:" + std::string(type) + ";base64," + base64)), "a").triangles.size(),
+                  1u);
     // A file may be longer than its buffer.
     folder.write("mesh.bin", gltf.bytes() + "more");
     EXPECT_EQ(read_mesh(folder.write("a.gltf", "\xef\xbb\xbf" + gltf.text("mesh.bin")), "a").triangles.size(), 1u);
@@ -70,8 +71,8 @@ TEST(Gltf, QuantisedPositions)
     expect_box(gltf.read(), {-0.01, 0, 0}, {0.01, 0.01, 0.01 * 64 / 127});
     // Shorts in steps of eight bytes, as they are aligned.
     const int padded = gltf.view(std::vector<std::uint16_t>{0, 0, 0, 9, 65535, 0, 0, 9, 0, 65535, 0, 9}, 8);
-    gltf.root["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = gltf.push(
-        "accessors", {{"bufferView", padded}, {"componentType", 5123}, {"count", 3}, {"type", "VEC3"}, {"normalized", true}});
+    gltf.root["meshes"][0]["primitives"][0]["attributes"]["POSITION"] =
+        gltf.push("accessors", {{"bufferView", padded}, {"componentType", 5123}, {"count", 3}, {"type", "VEC3"}, {"normalized", true}});
     expect_box(gltf.read(), {0, 0, 0}, {0.01, 0.01, 0});
 }
 
@@ -79,7 +80,8 @@ TEST(Gltf, NodesHangUnderEachOtherAndMirroredOnesTurnTriangles)
 {
     Gltf gltf = one_triangle({{"scale", {2, 2, 2}}});
     const int child = gltf.push("nodes", {{"mesh", 0}, {"scale", {-1, 1, 1}}});
-    const int middle = gltf.push("nodes", {{"children", {child}}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}}); // 90 degrees about z
+    const int middle =
+        gltf.push("nodes", {{"children", {child}}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}}); // 90 degrees about z
     gltf.node({{"children", {middle}}, {"translation", {10, 0, 0}}});
     const PolygonSoup soup = gltf.read();
     ASSERT_EQ(soup.sizes.size(), 2u);
@@ -150,7 +152,8 @@ TEST(Gltf, SparseAccessors)
 TEST(Gltf, MorphTargetsByTheirWeights)
 {
     Gltf gltf = one_triangle();
-    const int up = gltf.accessor(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3"), right = gltf.accessor(std::vector<float>{4, 0, 0, 4, 0, 0, 4, 0, 0}, "VEC3");
+    const int up = gltf.accessor(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3"),
+              right = gltf.accessor(std::vector<float>{4, 0, 0, 4, 0, 0, 4, 0, 0}, "VEC3");
     gltf.root["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", up}}, {{"POSITION", right}}};
     expect_box(gltf.read(), {0, 0, 0}, {1, 1, 0});
     gltf.root["meshes"][0]["weights"] = {0.5, 0.25};
@@ -184,12 +187,15 @@ TEST(Gltf, InstancesOfANode)
     Gltf gltf = one_triangle({{"translation", {0, 0, 1}}});
     const int places = gltf.accessor(std::vector<float>{0, 0, 0, 5, 0, 0, 0, 5, 0}, "VEC3");
     const int sizes = gltf.accessor(std::vector<float>{1, 1, 1, 2, 2, 2, -1, 1, 1}, "VEC3");
-    const int turns = gltf.accessor(std::vector<std::int8_t>{0, 0, 0, 127, 0, 0, 127, 0, 0, 0, 0, 127}, "VEC4", true); // the second half around
-    gltf.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", places}, {"SCALE", sizes}, {"ROTATION", turns}};
+    const int turns =
+        gltf.accessor(std::vector<std::int8_t>{0, 0, 0, 127, 0, 0, 127, 0, 0, 0, 0, 127}, "VEC4", true); // the second half around
+    gltf.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+        {"TRANSLATION", places}, {"SCALE", sizes}, {"ROTATION", turns}};
     const PolygonSoup soup = gltf.read();
     ASSERT_EQ(soup.sizes.size(), 3u);
     expect_box(soup, {-1, -2, 1}, {5, 6, 1}, 1e-9);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_GT(turn_z(soup, i), 0);
-    gltf.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] = gltf.accessor(std::vector<float>{1, 1, 1}, "VEC3");
+    gltf.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
+        gltf.accessor(std::vector<float>{1, 1, 1}, "VEC3");
     EXPECT_EQ(error_of([&] { gltf.read(); }).code(), ErrorCode::invalid_input);
 }

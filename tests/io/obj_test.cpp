@@ -7,7 +7,8 @@ using namespace penumbra::test;
 
 namespace {
 
-PolygonSoup read(const std::string& text, const std::map<std::string, std::string>& files = {}, std::vector<std::string>* warnings = nullptr)
+PolygonSoup read(const std::string& text, const std::map<std::string, std::string>& files = {},
+                 std::vector<std::string>* warnings = nullptr)
 {
     MeshSource source{.where = "x.obj", .companion = {}, .warnings = warnings};
     source.companion = [&](const std::string& name) {
@@ -33,8 +34,9 @@ std::string picture(float left, int channels = 1)
 
 TEST(Obj, ReadsWhatProgramsWrite)
 {
-    const PolygonSoup soup = read("\xef\xbb\xbf# a comment\r\nmtllib\r\no thing\r\nv 0 0 0 1\r\nv +2 0 0 2\r\nv 0 1e0 0 .5 .5 .5 # coloured\r\nvn 0 0 1\r\nvt 0 0\r\n"
-                                  "s off\r\nf 1/1/1 2//1 \\\r\n 3/1\r\nf -3 -2 -1\r\nl 1 2\r\np 1\r\n");
+    const PolygonSoup soup = read(
+        "\xef\xbb\xbf# a comment\r\nmtllib\r\no thing\r\nv 0 0 0 1\r\nv +2 0 0 2\r\nv 0 1e0 0 .5 .5 .5 # coloured\r\nvn 0 0 1\r\nvt 0 0\r\n"
+        "s off\r\nf 1/1/1 2//1 \\\r\n 3/1\r\nf -3 -2 -1\r\nl 1 2\r\np 1\r\n");
     EXPECT_EQ(soup.positions, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
     EXPECT_EQ(soup.corners, (std::vector<std::uint32_t>{0, 1, 2, 0, 1, 2}));
     EXPECT_EQ(soup.sizes, (std::vector<std::uint32_t>{3, 3}));
@@ -61,7 +63,8 @@ TEST(Obj, ErrorsNameTheLine)
 
 TEST(Obj, OpacityMapsCutOut)
 {
-    const std::string mesh = "mtllib my leaves.mtl\n" + corners + "vt 0 0\nvt 1 0\nvt 0 1\nusemtl leaf\nf 1/1 2/2 3/3\nusemtl bark\nf 1/1 2/2 3/3\n";
+    const std::string mesh =
+        "mtllib my leaves.mtl\n" + corners + "vt 0 0\nvt 1 0\nvt 0 1\nusemtl leaf\nf 1/1 2/2 3/3\nusemtl bark\nf 1/1 2/2 3/3\n";
     const std::string library = "newmtl bark\nKd 1 1 1\nnewmtl leaf\nmap_d -clamp on -s 2 1 1 tex\\leaf mask.png\n";
     for (const int channels : {1, 3, 4}) {
         std::vector<std::string> warnings;
@@ -95,14 +98,17 @@ TEST(Obj, MaterialsThatAreNotThereAreWarnedOf)
 TEST(Obj, FarCoordinatesKeepTheirDigitsUntilTheyArePlaced)
 {
     const Folder folder;
-    const std::string far = "4500000.125 5300000.25 100.0625", text = "v " + far + "\nv 4500000.25 5300000.25 100.0625\nv 4500000.125 5300000.375 100.0625\nf 1 2 3\n";
+    const std::string far = "4500000.125 5300000.25 100.0625",
+                      text = "v " + far + "\nv 4500000.25 5300000.25 100.0625\nv 4500000.125 5300000.375 100.0625\nf 1 2 3\n";
     MeshOptions options;
     options.placement.translation = {-4500000, -5300000, -100};
-    std::string ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\n"
-                      "property list uchar int vertex_indices\nend_header\n4500000.125 5300000.25 100.0625\n4500000.25 5300000.25 100.0625\n"
-                      "4500000.125 5300000.375 100.0625\n3 0 1 2\n";
-    std::string stl = "SOLID survey vertex\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 4500000.125 5300000.25 100.0625\nVERTEX 4500000.25 5300000.25 "
-                      "100.0625\nVERTEX 4500000.125 5300000.375 100.0625\nENDLOOP\nENDFACET\nENDSOLID\n";
+    std::string ply =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n4500000.125 5300000.25 100.0625\n4500000.25 5300000.25 100.0625\n"
+        "4500000.125 5300000.375 100.0625\n3 0 1 2\n";
+    std::string stl =
+        "SOLID survey vertex\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 4500000.125 5300000.25 100.0625\nVERTEX 4500000.25 5300000.25 "
+        "100.0625\nVERTEX 4500000.125 5300000.375 100.0625\nENDLOOP\nENDFACET\nENDSOLID\n";
     for (const std::string& path : {folder.write("a.obj", text), folder.write("a.ply", ply), folder.write("a.stl", stl)}) {
         SCOPED_TRACE(path);
         const TriangleMesh mesh = read_mesh(path, "x", options);

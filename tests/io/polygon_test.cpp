@@ -145,7 +145,8 @@ TEST(Polygon, RandomOnesFarFromTheOrigin)
         const int size = sizes(random);
         for (int i = 0; i < size; ++i) {
             const double angle = 2 * std::numbers::pi * i / size, r = 1 + steps(random) % 8;
-            ring.emplace_back(4.0e6 + std::round(1024 * r * std::cos(angle)) / 1024, 5.0e6 + std::round(1024 * r * std::sin(angle)) / 1024, 0);
+            ring.emplace_back(4.0e6 + std::round(1024 * r * std::cos(angle)) / 1024, 5.0e6 + std::round(1024 * r * std::sin(angle)) / 1024,
+                              0);
         }
         const Triangles triangles = triangulated(ring);
         ASSERT_EQ(triangles.size(), ring.size() - 2);
@@ -156,6 +157,7 @@ TEST(Polygon, RandomOnesFarFromTheOrigin)
 
 TEST(Polygon, WhatCrossesItselfOrHasNoAreaIsDropped)
 {
-    for (const Ring& ring : {Ring{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}}, Ring{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, Ring(9, Vec3(1, 2, 3))})
+    for (const Ring& ring :
+         {Ring{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}}, Ring{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, Ring(9, Vec3(1, 2, 3))})
         EXPECT_EQ(triangulated(ring).size(), ring.size() - 2);
 }

@@ -19,7 +19,8 @@ TriangleMesh soup(int side, double apart)
             for (const auto& corners : {std::array{0, 1, 3}, std::array{0, 3, 2}}) {
                 const auto first = static_cast<std::uint32_t>(mesh.positions.size());
                 for (const int c : corners)
-                    mesh.positions.emplace_back(static_cast<float>(x + c % 2 + off(random)), static_cast<float>(y + c / 2 + off(random)), 0.0f);
+                    mesh.positions.emplace_back(static_cast<float>(x + c % 2 + off(random)), static_cast<float>(y + c / 2 + off(random)),
+                                                0.0f);
                 mesh.triangles.push_back({first, first + 1, first + 2});
             }
     return mesh;

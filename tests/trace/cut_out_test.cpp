@@ -15,7 +15,8 @@ TriangleMesh half_square()
 {
     TriangleMesh mesh{.positions = {{-1, 2, 1}, {1, 2, 1}, {1, 2, -1}, {-1, 2, -1}}, .triangles = {{0, 1, 2}, {0, 2, 3}}};
     CutOuts cuts;
-    cuts.images.push_back({.alpha = {.width = 2, .height = 1, .channels = 1, .pixels = {0, 1}}, .beyond_u = CutOut::Beyond::clamp, .nearest = true});
+    cuts.images.push_back(
+        {.alpha = {.width = 2, .height = 1, .channels = 1, .pixels = {0, 1}}, .beyond_u = CutOut::Beyond::clamp, .nearest = true});
     cuts.image = {0, 0};
     cuts.texture = {{{{0, 1}, {1, 1}, {1, 0}}}, {{{0, 1}, {1, 0}, {0, 0}}}};
     mesh.cut_outs = std::make_shared<const CutOuts>(std::move(cuts));
