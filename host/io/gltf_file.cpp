@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 constexpr int most_nested = 100;
 
 // What a file may require: the first four are read; the others change how surfaces look and none of their places.
-constexpr std::array<std::string_view, 16> known_extensions{
+constexpr std::array<std::string_view, 17> known_extensions{
     "KHR_mesh_quantization",
     "EXT_mesh_gpu_instancing",
     "KHR_texture_transform",
@@ -36,6 +36,7 @@ constexpr std::array<std::string_view, 16> known_extensions{
     "KHR_materials_emissive_strength",
     "KHR_materials_transmission",
     "KHR_materials_volume",
+    "KHR_techniques_webgl",
     "KHR_materials_dispersion",
 };
 
@@ -144,9 +145,7 @@ Bytes bytes_at(const std::string& uri, const std::string& what, const MeshSource
         if (!data) throw broken_mesh(source.where, "has a broken data URI in " + what);
         return Bytes(std::move(*data));
     }
-    const std::string name = percent_decoded(uri);
-    if (!source.companion) throw broken_mesh(source.where, "names another file, " + in_quotes(name) + ", in " + what);
-    return source.companion(name);
+    return source.open(percent_decoded(uri));
 }
 
 Bytes read_buffer(const Json& entry, std::size_t place, const Parts& parts, const MeshSource& source)

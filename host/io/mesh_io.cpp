@@ -52,7 +52,8 @@ const Format& format_of(const std::string& path, std::string_view where)
 // Files that the mesh names, beside it.
 Bytes beside(const std::string& path, const std::string& name)
 {
-    return Bytes(read_file((std::filesystem::path(path).parent_path() / name).string(), name));
+    const std::string other = (std::filesystem::path(path).parent_path() / name).string();
+    return Bytes(read_file(other, other));
 }
 
 } // namespace

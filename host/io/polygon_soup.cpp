@@ -31,6 +31,17 @@ void MeshSource::warn(const std::string& what) const
     if (warnings) warnings->push_back(std::string(where) + " " + what);
 }
 
+Bytes MeshSource::open(const std::string& name) const
+{
+    if (!companion) throw Error(ErrorCode::not_found, std::string(where) + " names another file, " + in_quotes(name) + ", and has none");
+    try {
+        return companion(name);
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::not_found) throw;
+        throw Error(ErrorCode::not_found, std::string(where) + " names " + in_quotes(name) + ": " + error.message(), error.hint());
+    }
+}
+
 Error broken_mesh(std::string_view where, const std::string& what) { return {ErrorCode::invalid_input, std::string(where) + " " + what}; }
 
 void require_room(const PolygonSoup& soup, std::size_t vertices, std::size_t triangles, std::size_t times, std::string_view where)

@@ -45,6 +45,8 @@ struct MeshSource {
     std::vector<std::string>* warnings = nullptr;
 
     void warn(const std::string& what) const;
+    // The companion's bytes. Throws not_found naming both files.
+    Bytes open(const std::string& name) const;
 };
 
 // The error that the file is broken: "box.ply has a face ...".

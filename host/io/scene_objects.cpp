@@ -76,8 +76,8 @@ TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resource
     options.max_samples = resources.max_samples();
     options.warnings = &warnings;
     options.companion = [&](const std::string& other) {
-        const std::string beside = (std::filesystem::path(file).parent_path() / other).string();
-        return Bytes(read_file(resources.path(beside), beside));
+        const std::string path = resources.path((std::filesystem::path(file).parent_path() / other).string());
+        return Bytes(read_file(path, path));
     };
     return under(name, [&] {
         const std::string path = resources.path(file);

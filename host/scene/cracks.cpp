@@ -8,6 +8,9 @@
 namespace penumbra {
 namespace {
 
+// Vertices whose distance is not so many times less than their edges are detail.
+constexpr double crack_ratio = 16;
+
 // Places by cells of a side of `tolerance`: what is within it lies in the same cell or one next to it.
 class Cells {
 public:
@@ -51,8 +54,8 @@ private:
     std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
 };
 
-// The ends of the edges that one triangle alone has, each once.
-std::vector<std::uint32_t> border_vertices(const TriangleMesh& mesh)
+// Of each vertex the length of its shortest edge that one triangle alone has; 0 without one.
+std::vector<double> border_lengths(const TriangleMesh& mesh)
 {
     std::vector<std::uint64_t> edges;
     edges.reserve(3 * mesh.triangles.size());
@@ -62,16 +65,18 @@ std::vector<std::uint32_t> border_vertices(const TriangleMesh& mesh)
             edges.push_back(std::uint64_t{low} << 32 | high);
         }
     std::ranges::sort(edges);
-    std::vector<std::uint32_t> ends;
+    std::vector<double> shortest(mesh.positions.size());
     for (std::size_t i = 0; i < edges.size();) {
         std::size_t end = i + 1;
         while (end < edges.size() && edges[end] == edges[i]) ++end;
-        if (end == i + 1) ends.insert(ends.end(), {static_cast<std::uint32_t>(edges[i] >> 32), static_cast<std::uint32_t>(edges[i])});
+        if (end == i + 1) {
+            const auto a = static_cast<std::uint32_t>(edges[i] >> 32), b = static_cast<std::uint32_t>(edges[i]);
+            const double length = (Vec3(mesh.positions[a]) - Vec3(mesh.positions[b])).length();
+            for (const std::uint32_t vertex : {a, b}) shortest[vertex] = shortest[vertex] > 0 ? std::min(shortest[vertex], length) : length;
+        }
         i = end;
     }
-    std::ranges::sort(ends);
-    ends.erase(std::ranges::unique(ends).begin(), ends.end());
-    return ends;
+    return shortest;
 }
 
 } // namespace
@@ -91,16 +96,20 @@ std::vector<std::uint32_t> joined_within(std::span<const Imath::V3f> places, dou
 Cracks find_cracks(const TriangleMesh& mesh, double widest)
 {
     if (!(widest > 0)) return {};
-    const std::vector<std::uint32_t> border = border_vertices(mesh);
+    const std::vector<double> shortest = border_lengths(mesh);
     Cells cells(widest);
     std::vector<bool> meets(mesh.positions.size());
     Cracks cracks;
-    for (const std::uint32_t i : border) {
+    for (std::uint32_t i = 0; i < shortest.size(); ++i) {
+        if (!(shortest[i] > 0)) continue;
+        bool alone = true; // one of each cluster is kept, so that a cell never holds many
         cells.near(mesh.positions, mesh.positions[i], [&](std::uint32_t other, double distance) {
+            alone = false;
+            if (!(crack_ratio * distance < std::min(shortest[i], shortest[other]))) return;
             meets[i] = meets[other] = true;
             cracks.widest = std::max(cracks.widest, distance);
         });
-        if (!meets[i]) cells.add(i, mesh.positions[i]); // one of each cluster, so that a cell never holds many
+        if (alone) cells.add(i, mesh.positions[i]);
     }
     cracks.vertices = static_cast<std::size_t>(std::ranges::count(meets, true));
     return cracks;

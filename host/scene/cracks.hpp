@@ -20,7 +20,7 @@ struct Cracks {
     double widest = 0;        // the furthest that such two are apart
 };
 
-// Those up to `widest` apart. A border is an edge of one triangle alone.
+// Those up to `widest` apart, and less than a sixteenth of the shortest border at either. A border is an edge of one triangle alone.
 Cracks find_cracks(const TriangleMesh& mesh, double widest);
 
 } // namespace penumbra
