@@ -18,6 +18,9 @@ using Triangle = std::array<std::uint32_t, 3>;
 // Cracks up to this share of a mesh's diagonal are told of: 128 roundings of a float32 coordinate, while the details of a mesh are larger.
 constexpr double crack_share = 0x1p-17;
 
+// Steps of positions beyond this share of a mesh's diagonal are told of: a shadow's edge begins to show them.
+constexpr double coarse_share = 0x1p-12;
+
 bool is_finite(const Vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 std::string short_number(double number)
@@ -140,10 +143,19 @@ private:
     std::size_t lines_ = 0, joined_ = 0;
 };
 
-void warn_of_cracks(const TriangleMesh& mesh, const MeshSource& source)
+// Positions are float32 from here on: far from the origin their steps become coarse.
+void warn_of_steps(const Imath::Box3d& box, const MeshSource& source)
 {
-    Imath::Box3d box;
-    for (const Imath::V3f& p : mesh.positions) box.extendBy(Vec3(p));
+    double furthest = 0;
+    for (int axis = 0; axis < 3; ++axis) furthest = std::max({furthest, std::abs(box.min[axis]), std::abs(box.max[axis])});
+    const double step = std::ldexp(1.0, std::ilogb(furthest) - 23);
+    if (step > coarse_share * box.size().length())
+        source.warn("lies far from the origin for its size: float32 has steps of " + short_number(step) +
+                    " there; translate brings it near");
+}
+
+void warn_of_cracks(const TriangleMesh& mesh, const Imath::Box3d& box, const MeshSource& source)
+{
     const Cracks cracks = find_cracks(mesh, crack_share * box.size().length());
     if (cracks.vertices == 0) return;
     source.warn("has cracks: " + std::to_string(cracks.vertices) + " vertices of open edges lie within " + short_number(cracks.widest) +
@@ -162,7 +174,10 @@ TriangleMesh build_mesh(PolygonSoup soup, const ObjectPlacement& placement, doub
     if (builder.joined() > 0)
         source.warn("has " + std::to_string(builder.joined()) + " vertices that were joined with others within " + short_number(weld) +
                     " (weld)");
-    warn_of_cracks(mesh, source);
+    Imath::Box3d box;
+    for (const Imath::V3f& p : mesh.positions) box.extendBy(Vec3(p));
+    warn_of_steps(box, source);
+    warn_of_cracks(mesh, box, source);
     return mesh;
 }
 

@@ -109,9 +109,16 @@ TEST(Obj, FarCoordinatesKeepTheirDigitsUntilTheyArePlaced)
     std::string stl =
         "SOLID survey vertex\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 4500000.125 5300000.25 100.0625\nVERTEX 4500000.25 5300000.25 "
         "100.0625\nVERTEX 4500000.125 5300000.375 100.0625\nENDLOOP\nENDFACET\nENDSOLID\n";
+    std::vector<std::string> warnings;
+    options.warnings = &warnings;
     for (const std::string& path : {folder.write("a.obj", text), folder.write("a.ply", ply), folder.write("a.stl", stl)}) {
         SCOPED_TRACE(path);
         const TriangleMesh mesh = read_mesh(path, "x", options);
         EXPECT_EQ(mesh.positions, (std::vector<Imath::V3f>{{0.125f, 0.25f, 0.0625f}, {0.25f, 0.25f, 0.0625f}, {0.125f, 0.375f, 0.0625f}}));
     }
+    EXPECT_TRUE(warnings.empty()) << warnings[0];
+    options.placement.translation = {0, 0, 0};
+    read_mesh(folder.write("a.obj", "v 4500000 5300000 100\nv 4500020 5300000 100\nv 4500000 5300020 100\nf 1 2 3\n"), "x", options);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("steps of 0.5"), std::string::npos) << warnings[0];
 }
