@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/gltf_check.hpp"
 #include "io/uri.hpp"
 #include "io/words.hpp"
 
@@ -177,6 +178,7 @@ GltfFile open_gltf(std::span<const std::byte> bytes, const MeshSource& source)
     const Parts parts = parts_of(bytes, source.where);
     Json json = parsed(parts.json, source.where);
     check_extensions(json, source.where);
+    check_gltf_types(json, source.where);
 
     GltfFile file{.source = source, .model = {}, .buffers = {}, .images = {}};
     const Json buffers = take_list(json, "buffers", source.where);

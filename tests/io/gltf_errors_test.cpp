@@ -45,7 +45,7 @@ TEST(GltfErrors, NameWhatIsWrong)
     expect_broken(with("/bufferViews/0/byteLength", 1000), "bufferViews[0] of 1000 bytes");
     expect_broken(with("/bufferViews/0/buffer", 3), "buffers[3] of 1");
     expect_broken(with("/bufferViews/0/byteStride", 8), "elements of 12 bytes, 8 apart");
-    expect_broken(with("/meshes/0/primitives/0/attributes/POSITION", -1), "without POSITION");
+    expect_broken(with("/meshes/0/primitives/0/attributes", json::object()), "without POSITION");
     expect_broken(with("/meshes/0/primitives/0/attributes/POSITION", 7), "accessors[7] of 2");
     expect_broken(with("/meshes/0/primitives/0/mode", 7), "unknown mode 7");
     expect_broken(with("/meshes/0/primitives/0/material", 0), "materials[0] of 0");
@@ -74,6 +74,32 @@ TEST(GltfErrors, NameWhatIsWrong)
     json deep;
     for (int i = 0; i < 200; ++i) deep = json::array({deep});
     expect_broken(with("/extras", deep), "nested deeper");
+}
+
+// What tinygltf takes for missing would be a mesh that stands elsewhere.
+TEST(GltfErrors, NameKeysOfAnotherType)
+{
+    const auto with = [](const char* pointer, const json& value) {
+        Gltf gltf = sound();
+        gltf.root[json::json_pointer(pointer)] = value;
+        return gltf;
+    };
+    expect_broken(with("/nodes/0/translation", "far"), "has nodes[0].translation that is not a list of numbers");
+    expect_broken(with("/nodes/0/scale", {1, 2, "3"}), "has nodes[0].scale that is not a list of numbers");
+    expect_broken(with("/nodes/0/mesh", 4294967296), "has nodes[0].mesh that is not a number from 0");
+    expect_broken(with("/nodes/0/mesh", 0.5), "has nodes[0].mesh");
+    expect_broken(with("/nodes", {1}), "has nodes that is not a list of objects");
+    expect_broken(with("/scene", "first"), "has scene that is not");
+    expect_broken(with("/meshes/0/primitives", 3), "has meshes[0].primitives that is not a list of objects");
+    expect_broken(with("/meshes/0/primitives/0/mode", "4"), "has meshes[0].primitives[0].mode that is not");
+    expect_broken(with("/meshes/0/primitives/0/attributes/POSITION", -1), "has meshes[0].primitives[0].attributes that is not");
+    expect_broken(with("/meshes/0/primitives/0/targets", {{{"POSITION", true}}}),
+                  "has meshes[0].primitives[0].targets[0].POSITION that is not");
+    expect_broken(with("/accessors/0/count", -1), "has accessors[0].count that is not");
+    expect_broken(with("/accessors/0/sparse", {{"count", 1}, {"indices", 3}, {"values", 4}}),
+                  "has accessors[0].sparse.indices that is not an object");
+    expect_broken(with("/accessors/0/normalized", 1), "has accessors[0].normalized that is not true or false");
+    expect_broken(with("/materials", {{{"alphaMode", 1}}}), "has materials[0].alphaMode that is not a text");
 }
 
 TEST(GltfErrors, BrokenContainers)
