@@ -13,6 +13,7 @@
 #include "files.hpp"
 #include "io/image_format.hpp"
 #include "io/image_io.hpp"
+#include "io/words.hpp"
 #include "mask_files.hpp"
 
 namespace penumbra::cli {
@@ -39,7 +40,7 @@ std::string_view trimmed(std::string_view line)
 std::vector<std::string> scenes_in_list(const fs::path& list)
 {
     const std::vector<std::byte> bytes = read_file(list.string(), list.string());
-    std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    std::string_view text = without_byte_order_mark({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     std::vector<std::string> scenes;
     while (!text.empty()) {
         const std::size_t end = std::min(text.find('\n'), text.size());

@@ -6,6 +6,18 @@
 
 namespace penumbra {
 
+namespace {
+
+std::uint64_t bytes_of(const std::shared_ptr<const CutOuts>& cuts)
+{
+    if (!cuts) return 0;
+    std::uint64_t total = cuts->texture.size() * (sizeof(cuts->texture[0]) + sizeof(cuts->image[0]));
+    for (const CutOut& cut : cuts->images) total += cut.alpha.pixels.size() * sizeof(float);
+    return total;
+}
+
+} // namespace
+
 Geometry::Geometry(std::vector<Object> objects, const Vec3& near) : state_(std::make_shared<const State>(std::move(objects), near)) {}
 
 const std::vector<Object>& Geometry::objects() const { return *state_->objects; }
@@ -86,7 +98,7 @@ std::uint64_t Geometry::State::bytes() const
 {
     std::uint64_t total = 0;
     for (const Object& object : *objects)
-        total += (object.seen ? object.seen->depth.depth.size() * sizeof(float) : 0) + object.mesh.positions.size() * sizeof(Imath::V3f) + object.mesh.triangles.size() * sizeof(std::array<std::uint32_t, 3>);
+        total += bytes_of(object.mesh.cut_outs) + (object.seen ? object.seen->depth.depth.size() * sizeof(float) : 0) + object.mesh.positions.size() * sizeof(Imath::V3f) + object.mesh.triangles.size() * sizeof(std::array<std::uint32_t, 3>);
     const std::lock_guard lock(building_);
     if (casters_) total += casters_->bytes();
     if (receivers_ && receivers_ != casters_) total += receivers_->bytes();

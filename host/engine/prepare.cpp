@@ -131,13 +131,25 @@ private:
     const TriangleMesh* without(const std::vector<Ground>& grounds, const TriangleMesh& mesh)
     {
         if (grounds.empty()) return &mesh;
-        std::vector<std::array<std::uint32_t, 3>> left;
-        for (const auto& triangle : mesh.triangles)
-            if (!in_ground(grounds, mesh, triangle)) left.push_back(triangle);
+        std::vector<std::size_t> left;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+            if (!in_ground(grounds, mesh, mesh.triangles[t])) left.push_back(t);
         if (left.size() == mesh.triangles.size()) return &mesh;
         if (left.empty()) return nullptr;
-        parts_.push_back({mesh.positions, std::move(left)});
+        parts_.push_back({mesh.positions, chosen(mesh.triangles, left), cut_outs_of(mesh, left)});
         return &parts_.back();
+    }
+    template <class T> static std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places)
+    {
+        std::vector<T> result;
+        for (const std::size_t place : places) result.push_back(all[place]);
+        return result;
+    }
+    static std::shared_ptr<const CutOuts> cut_outs_of(const TriangleMesh& mesh, const std::vector<std::size_t>& left)
+    {
+        if (!mesh.cut_outs) return nullptr;
+        const CutOuts& all = *mesh.cut_outs;
+        return std::make_shared<const CutOuts>(CutOuts{all.images, chosen(all.image, left), chosen(all.texture, left)});
     }
 
     std::deque<TriangleMesh> parts_;
@@ -176,6 +188,16 @@ void say_quality(Prepared::State& state, const Geometry& geometry)
         const std::vector<std::string> warnings = quality_warnings(quality, where);
         state.warnings.insert(state.warnings.end(), warnings.begin(), warnings.end());
     }
+}
+
+// What traces meshes or sees their depth goes through what is cut out of them; what works on their edges or slices does not.
+void warn_of_cut_outs(Prepared::State& state, const Needs& needs, const Casting& casting, const Geometry& geometry)
+{
+    if (needs.casters == Needs::Casters::unused || needs.depth_images || casting.meshes.empty()) return;
+    for (const Object& object : geometry.objects())
+        if (object.casts && object.mesh.cut_outs)
+            state.warnings.push_back(object.name + " has materials that cut it out, which " + std::string(kind_of(state.technique)) +
+                                     " takes as whole: ray_traced and techniques of depth maps do not");
 }
 
 PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechnique& before, const Light& light)
@@ -284,6 +306,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, left_out, shown);
 
     prepare_technique(*state, casting);
+    warn_of_cut_outs(*state, needs, casting, geometry);
     say_quality(*state, geometry);
     state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view, left_out));
     if (needs.receivers_from_light && objects.any(&Object::receives)) state->receiver_geometry = geometry;

@@ -157,11 +157,12 @@ RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view cha
 
 Image read_image(const std::string& path) { return decode_image(read_file(path, path), path); }
 
-Image read_picture(const std::string& path)
+Image decode_picture(std::span<const std::byte> bytes, std::string_view where, std::uint64_t max_samples)
 {
-    const std::vector<std::byte> bytes = read_file(path, path);
-    if (sniff(bytes) != ImageFormat::jpeg) return decode_image(bytes, path);
-    return openimageio().decode_image(bytes, ImageFormat::jpeg, path, max_image_samples);
+    if (sniff(bytes) != ImageFormat::jpeg) return decode_image(bytes, where, max_samples);
+    return openimageio().decode_image(bytes, ImageFormat::jpeg, where, max_samples);
 }
+
+Image read_picture(const std::string& path) { return decode_picture(read_file(path, path), path); }
 
 } // namespace penumbra

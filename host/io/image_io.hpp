@@ -20,6 +20,9 @@ constexpr std::uint64_t max_image_samples = std::uint64_t{1} << 30;
 // A whole image (1 to 4 channels; alpha kept, not multiplied in). `where` starts every message.
 Image decode_image(std::span<const std::byte> bytes, std::string_view where, std::uint64_t max_samples = max_image_samples);
 
+// The same, and JPEG.
+Image decode_picture(std::span<const std::byte> bytes, std::string_view where, std::uint64_t max_samples = max_image_samples);
+
 // One depth channel, of the first part that has one. `channel` empty: Z, depth.Z, *.Depth.Z, OpenImageIO's own z channel, or the only
 // channel beside alpha; otherwise an error that lists the channels.
 RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where,

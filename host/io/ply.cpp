@@ -11,6 +11,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "io/words.hpp"
+
 namespace penumbra {
 
 namespace {
@@ -39,18 +41,6 @@ std::size_t size_of(Scalar type)
 {
     constexpr std::array<std::size_t, 8> sizes{1, 1, 2, 2, 4, 4, 4, 8};
     return sizes[static_cast<std::size_t>(type)];
-}
-
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-
-std::string_view next_word(std::string_view& rest)
-{
-    while (!rest.empty() && is_space(rest.front())) rest.remove_prefix(1);
-    std::size_t end = 0;
-    while (end < rest.size() && !is_space(rest[end])) ++end;
-    const std::string_view word = rest.substr(0, end);
-    rest.remove_prefix(end);
-    return word;
 }
 
 class Reader {
@@ -100,7 +90,7 @@ private:
 
     Header read_header()
     {
-        if (next_line() != "ply") throw fail("is not a PLY file");
+        if (without_byte_order_mark(next_line()) != "ply") throw fail("is not a PLY file");
         Header header;
         for (;;) {
             std::string_view line = next_line();
@@ -130,13 +120,11 @@ private:
 
     double ascii_value()
     {
-        std::string_view word = next_word(rest_);
+        const std::string_view word = next_word(rest_);
         if (word.empty()) throw fail("is truncated: its PLY data end early");
-        if (word.front() == '+') word.remove_prefix(1);
-        double number = 0;
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-        if (error != std::errc() || end != word.data() + word.size()) throw fail("has a broken number in its PLY data");
-        return number;
+        const std::optional<double> number = number_of(word);
+        if (!number) throw fail("has a broken number in its PLY data");
+        return *number;
     }
 
     double binary_value(Scalar type)
@@ -174,9 +162,10 @@ private:
         return 0;
     }
 
-    std::uint32_t index(Scalar type)
+    std::uint32_t index(Scalar type) { return as_index(value(type)); }
+
+    std::uint32_t as_index(double number) const
     {
-        const double number = value(type);
         if (!(number >= 0 && number <= 4294967295.0) || number != std::floor(number))
             throw fail("has a PLY list with a broken index or count");
         return static_cast<std::uint32_t>(number);
@@ -186,18 +175,18 @@ private:
     {
         // What takes no bytes cannot end early: a count of billions would only burn time.
         if (element.properties.empty() || element.count == 0) return;
-        const bool vertex = element.name == "vertex", face = element.name == "face";
+        const bool vertex = element.name == "vertex";
         if (vertex) check_has_positions(element);
         for (std::uint64_t i = 0; i < element.count; ++i) {
-            Imath::V3f position(0, 0, 0);
+            Vec3 position(0, 0, 0);
             for (const Property& property : element.properties) {
                 if (property.count) {
-                    read_list(property, face && (property.name == "vertex_indices" || property.name == "vertex_index"), soup);
+                    read_list(property, list_of(element, property), soup);
                     continue;
                 }
                 const double number = value(property.type);
                 if (vertex && property.name.size() == 1 && property.name[0] >= 'x' && property.name[0] <= 'z')
-                    position[property.name[0] - 'x'] = static_cast<float>(number);
+                    position[property.name[0] - 'x'] = number;
             }
             if (vertex) soup.positions.push_back(position);
         }
@@ -210,16 +199,46 @@ private:
                 throw fail(std::string("has PLY vertices without ") + axis);
     }
 
-    void read_list(const Property& property, bool is_polygon, PolygonSoup& soup)
+    enum class List { other, polygon, strips };
+
+    static List list_of(const Element& element, const Property& property)
+    {
+        if (property.name != "vertex_indices" && property.name != "vertex_index") return List::other;
+        return element.name == "face" ? List::polygon : element.name == "tristrips" ? List::strips : List::other;
+    }
+
+    void read_list(const Property& property, List list, PolygonSoup& soup)
     {
         const std::uint32_t count = index(*property.count);
+        if (list == List::strips) return read_strips(property, count, soup);
         for (std::uint32_t i = 0; i < count; ++i) {
-            if (is_polygon)
+            if (list == List::polygon)
                 soup.corners.push_back(index(property.type));
             else
                 value(property.type);
         }
-        if (is_polygon) soup.sizes.push_back(count);
+        if (list == List::polygon) soup.sizes.push_back(count);
+    }
+
+    // Strips one after the other, -1 between them. Every other triangle of a strip turns the other way.
+    void read_strips(const Property& property, std::uint32_t count, PolygonSoup& soup)
+    {
+        std::array<std::uint32_t, 2> before{};
+        std::uint32_t length = 0;
+        for (std::uint32_t i = 0; i < count; ++i) {
+            const double number = value(property.type);
+            if (number == -1) {
+                length = 0;
+                continue;
+            }
+            const std::uint32_t corner = as_index(number);
+            if (length >= 2) {
+                const bool odd = length % 2 != 0;
+                soup.add(std::array{before[odd ? 1 : 0], before[odd ? 0 : 1], corner});
+            }
+            before = {before[1], corner};
+            ++length;
+        }
     }
 
     std::string_view rest_, where_;

@@ -1,12 +1,15 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 
+#include "io/image_io.hpp"
 #include "io/mesh_io.hpp"
 #include "io/scene_check.hpp"
 #include "io/scene_parts.hpp"
 #include "scene/camera.hpp"
+#include "scene/object_placement.hpp"
 
 namespace penumbra {
 
@@ -36,19 +39,6 @@ Error with_names(const Error& error, const std::string& path, const std::string&
     return {error.code(), std::move(message), error.hint()};
 }
 
-TriangleMesh read_mesh_file(const JsonValue& name, const Resources& resources)
-{
-    const std::string file = name.text();
-    return under(name, [&] {
-        const std::string path = resources.path(file);
-        try {
-            return read_mesh(path, file);
-        } catch (const Error& error) {
-            throw with_names(error, path, file);
-        }
-    });
-}
-
 SeenSurface read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
                                 std::vector<std::string>& warnings)
 {
@@ -66,21 +56,7 @@ SeenSurface read_depth_surface(const JsonObject& section, const Light& light, co
     return {.depth = std::move(map), .camera = camera, .thickness = given_thickness ? thickness->number() : 0};
 }
 
-// Scale, then rotations about X, Y and Z, then translation.
-struct Placement {
-    double scale;
-    Vec3 cosine, sine, translation;
-
-    Vec3 turned(Vec3 p) const
-    {
-        p = {p.x, cosine.x * p.y - sine.x * p.z, sine.x * p.y + cosine.x * p.z};
-        p = {cosine.y * p.x + sine.y * p.z, p.y, cosine.y * p.z - sine.y * p.x};
-        return {cosine.z * p.x - sine.z * p.y, sine.z * p.x + cosine.z * p.y, p.z};
-    }
-    Vec3 placed(const Vec3& p) const { return turned(p * scale) + translation; }
-};
-
-Placement placement_of(const JsonObject& section)
+ObjectPlacement placement_of(const JsonObject& section)
 {
     const auto scale = section.find("scale"), rotate = section.find("rotate_deg"), translate = section.find("translate");
     const Vec3 r = rotate ? rotate->vec3() * (std::numbers::pi / 180) : Vec3(0, 0, 0);
@@ -90,9 +66,32 @@ Placement placement_of(const JsonObject& section)
             .translation = translate ? translate->vec3() : Vec3(0, 0, 0)};
 }
 
+// Files that a mesh names lie where it lies: beside it, or among the parts of the request.
+TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resources, std::vector<std::string>& warnings)
+{
+    const JsonValue name = section.need("mesh");
+    const std::string file = name.text();
+    const auto weld = section.find("weld");
+    MeshOptions options{.placement = placement_of(section), .weld = weld ? weld->number() : 0, .companion = {}};
+    options.max_samples = resources.max_samples();
+    options.warnings = &warnings;
+    options.companion = [&](const std::string& other) {
+        const std::string path = resources.path((std::filesystem::path(file).parent_path() / other).string());
+        return Bytes(read_file(path, path));
+    };
+    return under(name, [&] {
+        const std::string path = resources.path(file);
+        try {
+            return read_mesh(path, file, options);
+        } catch (const Error& error) {
+            throw with_names(error, path, file);
+        }
+    });
+}
+
 void place(TriangleMesh& mesh, const JsonObject& section)
 {
-    const Placement placement = placement_of(section);
+    const ObjectPlacement placement = placement_of(section);
     for (Imath::V3f& position : mesh.positions) {
         position = Imath::V3f(placement.placed(Vec3(position)));
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
@@ -103,7 +102,7 @@ void place(TriangleMesh& mesh, const JsonObject& section)
 // The camera moves with its surfaces and its depth grows with the scale; `thickness` is a length in the scene already.
 void place(SeenSurface& seen, const JsonObject& section)
 {
-    const Placement placement = placement_of(section);
+    const ObjectPlacement placement = placement_of(section);
     Frame& frame = seen.camera.frame;
     frame = {.origin = placement.placed(frame.origin), .x = placement.turned(frame.x), .y = placement.turned(frame.y), .z = placement.turned(frame.z)};
     if (placement.scale == 1) return;
@@ -140,8 +139,12 @@ penumbra::Object parse_object(const JsonValue& value, const Light& light, const 
         place(*object.seen, section);
     } else {
         object.name = section.has("mesh") ? section.need("mesh").text() : "quad";
-        object.mesh = section.has("mesh") ? read_mesh_file(section.need("mesh"), resources) : read_quad(section.need("quad"));
-        place(object.mesh, section);
+        if (section.has("mesh")) {
+            object.mesh = read_mesh_file(section, resources, warnings);
+        } else {
+            object.mesh = read_quad(section.need("quad"));
+            place(object.mesh, section);
+        }
     }
     return object;
 }

@@ -136,10 +136,17 @@ Vec3 viewpoint(const LightFrame& frame, const Camera& camera, const Topology& to
     return camera.frame.origin - frame.direction * (1e4 * reach);
 }
 
+// Whether a caster's edges are not those of its triangles alone.
+bool any_cut_out(const Casting& casting)
+{
+    return std::ranges::any_of(casting.meshes, [](const TriangleMesh* mesh) { return mesh->cut_outs != nullptr; });
+}
+
 // Of the objects that cast, or of the surfaces that the map shows.
 std::shared_ptr<const Topology> topology_of(const Casting& casting, const Smoothie& settings)
 {
-    if (!casting.meshes.empty() && settings.silhouettes == SilhouetteSource::object) return casting.topology();
+    const bool of_objects = !casting.meshes.empty() && !any_cut_out(casting) && settings.silhouettes == SilhouetteSource::object;
+    if (of_objects) return casting.topology();
     const TriangleMesh surfaces = mesh_of_texels(*casting.depth.front, casting.depth.camera);
     const TriangleMesh* const meshes[] = {&surfaces};
     return std::make_shared<const Topology>(meshes);
@@ -261,6 +268,8 @@ PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoot
     work.stage("topology");
     if (casting.meshes.empty() && settings.silhouettes == SilhouetteSource::object)
         findings.warnings.emplace_back("there are no objects that cast: silhouettes are those of the depth map (silhouettes image)");
+    if (any_cut_out(casting) && settings.silhouettes == SilhouetteSource::object)
+        findings.warnings.emplace_back("materials cut casters out: silhouettes are those of the depth map (silhouettes image)");
     const std::shared_ptr<const Topology> topology = topology_of(casting, settings);
     work.moved(topology->bytes());
 

@@ -81,11 +81,14 @@ ViewRay view_ray(const Tracer::Impl& scene, const Camera& camera, int width, int
 void collect_crossing(const RTCFilterFunctionNArguments* arguments)
 {
     auto* context = reinterpret_cast<CollectingContext*>(arguments->context);
+    const auto* cuts = static_cast<const std::vector<TracedCut>*>(arguments->geometryUserPtr); // null when nothing is cut out
     for (unsigned i = 0; i < arguments->N; ++i) {
         if (arguments->valid[i] == 0) continue;
         arguments->valid[i] = 0;
+        const unsigned triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
+        if (cuts && !is_there((*cuts)[triangle], RTCHitN_u(arguments->hit, arguments->N, i), RTCHitN_v(arguments->hit, arguments->N, i))) continue;
         try {
-            context->crossings->push_back({.triangle = RTCHitN_primID(arguments->hit, arguments->N, i)});
+            context->crossings->push_back({.triangle = triangle});
         } catch (const std::bad_alloc&) {
             context->out_of_memory = true; // no exception may pass through Embree
         }

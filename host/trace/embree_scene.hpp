@@ -15,6 +15,7 @@
 
 #include <Imath/ImathBox.h>
 
+#include "trace/cut_filter.hpp"
 #include "trace/tracer.hpp"
 
 namespace penumbra {
@@ -41,6 +42,7 @@ struct Tracer::Impl {
     double scale = 1;
     std::vector<Imath::V3f> vertices; // one more than is used: Embree reads 16 bytes from each vertex
     std::vector<std::array<std::uint32_t, 3>> triangles;
+    std::vector<TracedCut> cuts; // of each triangle; empty when nothing is cut out
     std::uint64_t degenerate = 0;
 
     Imath::Box3d box;         // of the vertices that triangles use, traced space
@@ -55,7 +57,10 @@ struct Tracer::Impl {
 
 private:
     void take(std::span<const TriangleMesh* const> meshes);
+    void drop_degenerate();
     void build();
+
+    std::vector<std::shared_ptr<const CutOuts>> images_; // that `cuts` points into
 };
 
 } // namespace penumbra

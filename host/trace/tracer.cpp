@@ -75,8 +75,11 @@ void Tracer::Impl::take(std::span<const TriangleMesh* const> meshes)
     double furthest = 0;
     std::uint32_t first_vertex = 0;
     std::vector<bool> used(vertex_count, false);
+    const bool any_cut = std::ranges::any_of(meshes, [](const TriangleMesh* mesh) { return mesh->cut_outs != nullptr; });
     for (std::size_t m = 0; m < meshes.size(); ++m) {
         const TriangleMesh& mesh = *meshes[m];
+        require_cut_outs(mesh, m);
+        if (mesh.cut_outs) images_.push_back(mesh.cut_outs);
         for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
             require_corners(mesh, m, t);
             const auto& corners = mesh.triangles[t];
@@ -89,6 +92,7 @@ void Tracer::Impl::take(std::span<const TriangleMesh* const> meshes)
                 used[first_vertex + c] = true;
             }
             triangles.push_back({first_vertex + corners[0], first_vertex + corners[1], first_vertex + corners[2]});
+            if (any_cut) cuts.push_back(cut_of(mesh, t));
         }
         first_vertex += static_cast<std::uint32_t>(mesh.positions.size());
     }
@@ -106,12 +110,25 @@ void Tracer::Impl::take(std::span<const TriangleMesh* const> meshes)
             ++v;
         }
 
-    // Near a far origin, corners that the mesh holds apart may round to one line.
-    degenerate += std::erase_if(triangles, [this](const auto& t) {
-        const Vec3 a(vertices[t[0]]), b(vertices[t[1]]), c(vertices[t[2]]);
-        return (b - a).cross(c - a) == Vec3(0, 0, 0);
-    });
+    drop_degenerate();
     for (std::uint32_t t = 0; t < triangles.size(); ++t) surface_reach = std::max(surface_reach, reach(triangle_surface(*this, t)));
+}
+
+// Near a far origin, corners that the mesh holds apart may round to one line.
+void Tracer::Impl::drop_degenerate()
+{
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        const auto& t = triangles[i];
+        const Vec3 a(vertices[t[0]]), b(vertices[t[1]]), c(vertices[t[2]]);
+        if ((b - a).cross(c - a) == Vec3(0, 0, 0)) continue;
+        triangles[kept] = t;
+        if (!cuts.empty()) cuts[kept] = cuts[i];
+        ++kept;
+    }
+    degenerate += triangles.size() - kept;
+    triangles.resize(kept);
+    if (!cuts.empty()) cuts.resize(kept);
 }
 
 void Tracer::Impl::build()
@@ -147,6 +164,10 @@ void Tracer::Impl::build()
         rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, triangles.data(), 0, sizeof(triangles[0]),
                                    triangles.size());
         rtcSetGeometryIntersectFilterFunction(geometry, collect_crossing);
+        if (!cuts.empty()) {
+            rtcSetGeometryUserData(geometry, &cuts);
+            rtcSetGeometryOccludedFilterFunction(geometry, pass_cut_outs);
+        }
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(scene, geometry);
         rtcReleaseGeometry(geometry);

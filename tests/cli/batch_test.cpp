@@ -69,7 +69,7 @@ TEST_F(BatchCommand, FolderGivesTheMasksThatSingleRunsGive)
 TEST_F(BatchCommand, ListWithCommentsRelativeToTheList)
 {
     write_scenes(3);
-    write_text(path("list.txt"), "# two of three\n\n  scenes/s2.json \r\n" + path("scenes/s0.json"));
+    write_text(path("list.txt"), "\xef\xbb\xbf# two of three\n\n  scenes/s2.json \r\n" + path("scenes/s0.json"));
     const Ran ran =
         penumbra({"batch", path("list.txt"), "--out", path("masks"), "--technique", "shadow_map", "--set", "filter=hard", "--verbose"});
     EXPECT_EQ(ran.code, 0) << ran.err;

@@ -237,7 +237,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Model{"wuson_ply", models + "/PLY/Wuson.ply", 412, 0}, Model{"spider_obj", models + "/OBJ/spider.obj", 72, 0},
                       Model{"sphere_with_hole", models + "/STL/sphereWithHole.stl", 9, 0},
                       Model{"max_export", models + "/STL/3DSMaxExport.STL", 0, 16},
-                      Model{"engine", models + "/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb", 13292, 0, layered},
+                      Model{"engine", models + "/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb", 13308, 0, layered},
                       Model{"box_gltf", models + "/glTF2/BoxTextured-glTF/BoxTextured.gltf", 0, 0},
                       Model{"fels", models + "/3DS/fels.3ds", 0, 0}),
     [](const auto& test) { return test.param.name; });

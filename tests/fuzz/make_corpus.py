@@ -188,6 +188,52 @@ QUADS = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (
 TRIANGLES = [t for q in QUADS for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))]
 
 
+
+def everything():
+    """A document and its buffer: a skin, weights, instances, a sparse accessor, a strip of shorts, a cut-out."""
+    chunks, views = [], []
+
+    def view(data):
+        offset = sum(len(chunk) for chunk in chunks)
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(data)})
+        chunks.append(data + b"\0" * (-len(data) % 4))
+        return len(views) - 1
+
+    def floats(*numbers):
+        return struct.pack("<%df" % len(numbers), *numbers)
+
+    accessors = []
+
+    def accessor(data, component, count, kind, **more):
+        accessors.append({"bufferView": view(data), "componentType": component, "count": count, "type": kind, **more})
+        return len(accessors) - 1
+
+    square = accessor(struct.pack("<12h", 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0), 5122, 4, "VEC3")
+    accessors[square]["sparse"] = {"count": 1, "indices": {"bufferView": view(b"\1"), "componentType": 5121}, "values": {"bufferView": view(struct.pack("<3h", 2, 0, 0))}}
+    texture = accessor(bytes([0, 0, 255, 0, 0, 255, 255, 255]), 5121, 4, "VEC2", normalized=True)
+    moves = accessor(floats(*[0, 0, 1] * 4), 5126, 4, "VEC3")
+    joints = accessor(bytes([0, 1, 0, 0] * 4), 5121, 4, "VEC4")
+    weights = accessor(bytes([128, 127, 0, 0] * 4), 5121, 4, "VEC4", normalized=True)
+    identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    bind = accessor(floats(*identity * 2), 5126, 2, "MAT4")
+    places = accessor(floats(0, 0, 0, 2, 0, 0), 5126, 2, "VEC3")
+    picture = view(png(4, 4, 8, 6, False))
+    attributes = {"POSITION": square, "TEXCOORD_0": texture}
+    document = {
+        "asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"], "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"mesh": 0, "weights": [0.5], "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}},
+                  {"mesh": 1, "skin": 0}, {"children": [3], "scale": [-1, 1, 1]}, {"rotation": [0, 0, 1, 0]}],
+        "meshes": [{"primitives": [{"attributes": attributes, "mode": 5, "material": 0, "targets": [{"POSITION": moves}]}]},
+                   {"primitives": [{"attributes": {**attributes, "JOINTS_0": joints, "WEIGHTS_0": weights}, "mode": 6}]}],
+        "skins": [{"joints": [2, 3], "inverseBindMatrices": bind}],
+        "materials": [{"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}}}],
+        "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33648, "wrapT": 33071}],
+        "images": [{"bufferView": picture, "mimeType": "image/png"}], "accessors": accessors, "bufferViews": views}
+    binary = b"".join(chunks)
+    document["buffers"] = [{"byteLength": len(binary)}]
+    return document, binary
+
+
 def meshes():
     head = "ply\nformat {}\ncomment a cube\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n{}element face 6\nproperty list uchar int vertex_indices\nend_header\n"
     put("mesh_ply", "ascii.ply", head.format("ascii 1.0", "property uchar red\n") + "".join(f"{x} {y} {z} 7\n" for x, y, z in CORNERS) +
@@ -248,6 +294,7 @@ def meshes():
         text += b" " * (-len(text) % 4)
         return struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)) + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
     put("mesh_glb", "cube.glb", glb(gltf({"byteLength": len(binary)}), binary))
+    put("mesh_glb", "everything.glb", glb(*everything()))
 
 
 # --- Forms, scenes, patches

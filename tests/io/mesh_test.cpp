@@ -5,7 +5,6 @@
 
 #include "io/mesh_io.hpp"
 #include "io/ply.hpp"
-#include "io/polygon.hpp"
 #include "io/support.hpp"
 
 using namespace penumbra;
@@ -35,13 +34,6 @@ bool is_closed(const TriangleMesh& mesh)
         const auto back = edges.find({edge.first.second, edge.first.first});
         return edge.second == 1 && back != edges.end() && back->second == 1;
     });
-}
-
-double area(const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Imath::V3f>& p)
-{
-    double twice = 0;
-    for (const auto& [a, b, c] : triangles) twice += (Vec3(p[b]) - Vec3(p[a])).cross(Vec3(p[c]) - Vec3(p[a])).z;
-    return twice / 2;
 }
 
 } // namespace
@@ -76,6 +68,50 @@ TEST(Mesh, StlIsJoinedFromLooseTriangles)
     EXPECT_LT(binary.positions.size(), 3 * binary.triangles.size() / 2);
 }
 
+TEST(Mesh, StlAsTextInAnyCase)
+{
+    const Folder folder;
+    const std::string loop = "OUTER LOOP\r\nVERTEX 0 0 0\r\nVERTEX 1 0 0\r\nVertex 0 1 0\r\nENDLOOP\r\nENDFACET\r\n";
+    const std::string text = "\xef\xbb\xbfSOLID a thing\r\nFACET NORMAL 0 0 1\r\n" + loop + "ENDSOLID vertex\r\nsolid second\r\nfacet normal 0 0 1\r\n" + loop;
+    EXPECT_EQ(read(folder.write("a.stl", text)).triangles.size(), 2u);
+    EXPECT_EQ(error_of([&] { read(folder.write("a.stl", "solid\nfacet\nouter loop\nvertex 1 2\nendloop")); }).code(), ErrorCode::invalid_input);
+    EXPECT_EQ(error_of([&] { read(folder.write("a.stl", "solid\nouter loop\nvertex 1 2 3\nendloop")); }).code(), ErrorCode::invalid_input);
+    EXPECT_EQ(error_of([&] { read(folder.write("a.stl", "nothing")); }).code(), ErrorCode::invalid_input);
+}
+
+TEST(Mesh, CracksAreWarnedOfAndWelded)
+{
+    // Two squares side by side as loose triangles, corners a millionth apart.
+    const Folder folder;
+    const std::string path = folder.write("soup.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nv 0.000001 0 0\nv 1 1.000001 0\nv 0 1 0\nf 4 5 6\n");
+    MeshOptions options;
+    std::vector<std::string> warnings;
+    options.warnings = &warnings;
+    EXPECT_EQ(read_mesh(path, "soup.obj", options).positions.size(), 6u);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("4 vertices of open edges lie within 1e-06"), std::string::npos) << warnings[0];
+    // With the length that the warning gives.
+    options.weld = std::stod(warnings[0].substr(warnings[0].find("\"weld\": ") + 8));
+    EXPECT_LT(options.weld, 1.3e-6);
+    warnings.clear();
+    const TriangleMesh welded = read_mesh(path, "soup.obj", options);
+    EXPECT_EQ(welded.positions.size(), 4u);
+    EXPECT_EQ(welded.triangles.size(), 2u);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("2 vertices that were joined"), std::string::npos) << warnings[0];
+}
+
+TEST(Mesh, PointsAndLinesAreWarnedOf)
+{
+    const Folder folder;
+    MeshOptions options;
+    std::vector<std::string> warnings;
+    options.warnings = &warnings;
+    read_mesh(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nf 1 2\n"), "a.obj", options);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("2 points and lines"), std::string::npos) << warnings[0];
+}
+
 TEST(Mesh, NodeTransformsAreApplied)
 {
     const Folder folder;
@@ -102,7 +138,7 @@ TEST(Mesh, BrokenFilesAreErrors)
     for (const char* name :
          {"invalid/empty.obj", "invalid/empty.ply", "invalid/empty.3ds", "invalid/malformed.obj", "OBJ/point_cloud.obj", "OBJ/testline.obj",
           "OBJ/testpoints.obj", "PLY/points.ply", "PLY/pond.0.ply", "glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb",
-          "glTF2/MissingBin/BoxTextured.gltf", "glTF2/RecursiveNodes/RecursiveNodes.gltf",
+          "glTF2/RecursiveNodes/RecursiveNodes.gltf",
           "glTF2/IndexOutOfRange/AllIndicesOutOfRange.gltf", "glTF2/TestNoRootNode/NoScene.gltf",
           "glTF2/TestNoRootNode/SceneWithoutNodes.gltf", "glTF2/wrongTypes/badArray.gltf", "glTF/TwoBoxes/TwoBoxes.gltf"}) {
         SCOPED_TRACE(name);
@@ -114,6 +150,9 @@ TEST(Mesh, BrokenFilesAreErrors)
 TEST(Mesh, MissingAndForeignFiles)
 {
     EXPECT_EQ(error_of([] { read("none.obj"); }).code(), ErrorCode::not_found);
+    const Error missing = error_of([] { read(models + "/glTF2/MissingBin/BoxTextured.gltf"); });
+    EXPECT_EQ(missing.code(), ErrorCode::not_found);
+    EXPECT_NE(missing.message().find(".bin"), std::string::npos) << missing.message();
     EXPECT_EQ(error_of([] { read(models + "/Collada/duck.dae"); }).code(), ErrorCode::unsupported);
     EXPECT_EQ(error_of([] { read(models + "/OFF/Cube.off"); }).code(), ErrorCode::unsupported);
     const Folder folder;
@@ -158,14 +197,28 @@ TEST(Ply, ReadsEveryLayout)
     binary += std::string("\x03\x00\x00\x01\x00\x02\x00", 7);
     const PolygonSoup little = decode_ply(bytes_of("ply\nformat binary_little_endian 1.0" + head + binary), "x");
     for (const PolygonSoup& soup : {ascii, little}) {
-        EXPECT_EQ(soup.positions, (std::vector<Imath::V3f>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+        EXPECT_EQ(soup.positions, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
         EXPECT_EQ(soup.corners, (std::vector<std::uint32_t>{0, 1, 2}));
         EXPECT_EQ(soup.sizes, (std::vector<std::uint32_t>{3}));
     }
     const std::string one = "\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     const PolygonSoup big =
         decode_ply(bytes_of("ply\nformat binary_big_endian 1.0" + one + std::string("\x3f\x80\0\0\x40\0\0\0\0\0\0\0", 12)), "x");
-    EXPECT_EQ(big.positions, (std::vector<Imath::V3f>{{1, 2, 0}}));
+    EXPECT_EQ(big.positions, (std::vector<Vec3>{{1, 2, 0}}));
+}
+
+TEST(Ply, TriangleStrips)
+{
+    // Two strips, -1 between them, as the Stanford scans have them.
+    const PolygonSoup soup = decode_ply(bytes_of("ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+                                                 "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+                                                 "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 0 0\n9 0 1 2 3 -1 1 4 3 -1\n"), "x");
+    EXPECT_EQ(soup.sizes, (std::vector<std::uint32_t>{3, 3, 3}));
+    EXPECT_EQ(soup.corners, (std::vector<std::uint32_t>{0, 1, 2, 2, 1, 3, 1, 4, 3}));
+    for (std::size_t t = 0; t < 3; ++t) {
+        const auto at = [&](std::size_t k) { return soup.positions[soup.corners[3 * t + k]]; };
+        EXPECT_GT((at(1) - at(0)).cross(at(2) - at(0)).z, 0) << t;
+    }
 }
 
 TEST(Ply, CountsThatLieCostNothing)
@@ -177,33 +230,7 @@ TEST(Ply, CountsThatLieCostNothing)
           "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\nend_header\n3 0 1 2\n",
           "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\nend_header\n3 0 -1 2\n",
           "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n0 0\n", "ply\n", "ply",
+          "ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n3 0 -2 2\n",
           "ply\nformat ascii 1.0\nelement vertex x\nend_header\n", "ply\nformat ascii 1.0\nproperty float x\nend_header\n"})
         EXPECT_EQ(error_of([&] { decode_ply(bytes_of(text), "x"); }).code(), ErrorCode::invalid_input) << text;
-}
-
-TEST(Polygon, ConcaveOnesKeepTheirAreaAndSense)
-{
-    const std::vector<std::vector<Imath::V3f>> polygons{
-        {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},                                             // square
-        {{0, 0, 0}, {2, -1, 0}, {0.5f, 0, 0}, {2, 1, 0}},                                         // arrow head
-        {{0, 0, 0}, {4, 0, 0}, {4, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}}, // U
-        {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}},                                             // a corner in a line
-    };
-    const double areas[] = {1, 0.5, 8, 1};
-    for (std::size_t i = 0; i < polygons.size(); ++i)
-        for (std::size_t turn = 0; turn < polygons[i].size(); ++turn) {
-            std::vector<std::uint32_t> corners;
-            for (std::size_t k = 0; k < polygons[i].size(); ++k)
-                corners.push_back(static_cast<std::uint32_t>((k + turn) % polygons[i].size()));
-            std::vector<std::array<std::uint32_t, 3>> triangles;
-            triangulate(corners, polygons[i], triangles);
-            EXPECT_EQ(triangles.size(), corners.size() - 2);
-            for (const auto& triangle : triangles)
-                EXPECT_GE(area({triangle}, polygons[i]), 0) << "polygon " << i << " from corner " << turn;
-            EXPECT_EQ(area(triangles, polygons[i]), areas[i]) << "polygon " << i << " from corner " << turn;
-            std::ranges::reverse(corners);
-            triangles.clear();
-            triangulate(corners, polygons[i], triangles);
-            EXPECT_EQ(area(triangles, polygons[i]), -areas[i]);
-        }
 }

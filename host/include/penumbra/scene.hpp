@@ -129,10 +129,29 @@ struct SurfaceNormals;
 
 // --- What casts and what receives ----------------------------------------------------------------------------------------------
 
+// An image of how much of a surface is there: where it shows less than `cutoff`, nothing is. Looked up bilinearly between the texels' middles.
+struct CutOut {
+    enum class Beyond { repeat, mirror, clamp }; // what is seen outside of the image
+    Image alpha;                                 // 1 channel
+    float cutoff = 0.5f;
+    Beyond beyond_u = Beyond::repeat, beyond_v = Beyond::repeat;
+    bool nearest = false; // the nearest texel instead
+};
+
+// What of a mesh's triangles is cut out (leaves, fences). Rays and rendered depth go through; techniques that work on the mesh's own edges take
+// the triangles as whole.
+struct CutOuts {
+    static constexpr std::uint32_t none = 0xffffffff;
+    std::vector<CutOut> images;
+    std::vector<std::uint32_t> image;                  // of each triangle: one of `images`, or none
+    std::vector<std::array<Imath::V2f, 3>> texture;    // of each triangle's corners: (0, 0) is the image's top left, (1, 1) its bottom right
+};
+
 // Triangles in world space; three indices a triangle, counter-clockwise seen from outside.
 struct TriangleMesh {
     std::vector<Imath::V3f> positions;
     std::vector<std::array<std::uint32_t, 3>> triangles;
+    std::shared_ptr<const CutOuts> cut_outs = {}; // empty: nothing is cut out
 };
 
 // The surfaces that one camera sees: its depth image, fitted and traced in the image itself (docs/depth.md).

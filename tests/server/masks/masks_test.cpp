@@ -126,6 +126,33 @@ TEST(Masks, MeshesComeAsPartsWhereTheyAreAllowed)
     EXPECT_FALSE(holds(wrong.body, "/tmp")) << wrong.body;
 }
 
+TEST(Masks, FilesThatAMeshNamesArePartsToo)
+{
+    nlohmann::json scene = scene_json();
+    scene["occluders"] = {{"camera", scene["occluders"]["camera"]}, {"resolution", {side, side}}};
+    scene["objects"] = {{{"mesh", "plate.gltf"}}};
+    const nlohmann::json gltf = {{"asset", {{"version", "2.0"}}},
+                                 {"nodes", {{{"mesh", 0}}}},
+                                 {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}}},
+                                 {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}}}},
+                                 {"bufferViews", {{{"buffer", 0}, {"byteLength", 36}}}},
+                                 {"buffers", {{{"byteLength", 36}, {"uri", "plate%2Ebin"}}}}};
+    const std::array<float, 9> corners{-1, -1, -1, 1, -1, -1, 0, -1, 1};
+    Parts all{{"scene", scene.dump()}, {"floor.exr", parts()[2].second}, {"plate.gltf", gltf.dump()}};
+    Running open{server::Options{.device = {}, .token = {}, .allow_meshes = true}};
+    const Reply alone = ask(open.port, post(form(all)));
+    EXPECT_EQ(alone.status, 422) << alone.body;
+    EXPECT_TRUE(holds(alone.detail(), "objects[0].mesh")) << alone.detail();
+    EXPECT_TRUE(holds(alone.detail(), "no part named \"plate.bin\"")) << alone.detail();
+    all.push_back({"plate.bin", std::string(reinterpret_cast<const char*>(corners.data()), 36)});
+    const Reply reply = ask(open.port, post(form(all)));
+    EXPECT_EQ(reply.status, 200) << reply.body;
+    all[2] = {"plate.obj", "v -1 -1 -1\nv 1 -1 -1\nv 0 -1 1\nf 1 2 3\n"};
+    scene["objects"][0]["mesh"] = "plate.obj";
+    all[0].second = scene.dump();
+    EXPECT_TRUE(ask(open.port, post(form(all))).body == reply.body) << "the same triangle";
+}
+
 TEST(Negotiate, WeightsAndRanges)
 {
     EXPECT_EQ(server::negotiate("", server::MaskImage::mask).format, "png");
