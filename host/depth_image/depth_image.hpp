@@ -40,8 +40,8 @@ struct SurfaceNormals {
     std::vector<DepthVector> directions; // [height][width]
 };
 
-// Lifted along the normal by .6 of the pixel's footprint times the sine of the angle of view, by what the plane may be off, and by 1e-5 of
-// the depth.
+// Lifted along the normal by .3 of the window's half width (5 x 5 pixels: .6 of the pixel's footprint) times the sine of the angle of view, by what
+// the plane may be off, and by 1e-5 of the depth.
 DepthSurface depth_surface(const DepthFit& fit, const Camera& camera);
 
 // Whether one camera's pixels are the other's receivers, all but for the rounding of how its place was written.

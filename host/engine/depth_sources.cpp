@@ -38,11 +38,12 @@ LeftOut left_out_of(const Light& light, const std::vector<Object>& objects, cons
     if (needs.whole_view || (needs.depth_images && !needs.front)) return result;
     result.receivers = true;
     if (!receivers) return result;
-    std::vector<Ground> grounds = grounds_of(light_frame(light), objects);
+    const LightFrame frame = light_frame(light);
+    std::vector<Ground> grounds = grounds_of(frame, objects);
     // Receivers that are rendered from the objects lie before ground, as those do.
     if (receivers->depth && !grounds.empty()) {
         const Camera camera = resolve_camera(receivers->camera, light, objects, receivers->width, receivers->height, "receivers.camera");
-        if (shows_behind(grounds, *receivers->depth, camera)) return result;
+        if (shows_behind(grounds, frame, *receivers->depth, camera)) return result;
     }
     result.grounds = std::move(grounds);
     return result;

@@ -105,7 +105,7 @@ private:
         const Receivers& given = *job_.receivers;
         if (grounds.empty() || !given.depth) return true;
         const Camera camera = resolve_camera(given.camera, light, job_.geometry.objects(), given.width, given.height, "receivers.camera");
-        return !shows_behind(grounds, *given.depth, camera);
+        return !shows_behind(grounds, light_frame(light), *given.depth, camera);
     }
 
     // The receivers with their depth; the first light renders it where it is missing.

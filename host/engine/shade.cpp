@@ -89,7 +89,7 @@ void warn_of_dark_side(const Light& light, const Receivers& receivers, const Cam
     if (!std::holds_alternative<PointLight>(light) && !std::holds_alternative<SphereLight>(light)) return;
     const LightFrame frame = light_frame(light);
     const Ground plane{.normal = frame.direction, .offset = frame.direction.dot(frame.origin)};
-    if (shows_behind({plane}, *receivers.depth, camera))
+    if (shows_behind({plane}, frame, *receivers.depth, camera))
         report.warnings.push_back("receivers lie behind the " + kind_of(light) + " light, which shines to one side: they count as lit; turn its direction towards them");
 }
 
@@ -185,7 +185,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     opencl::Buffer<float> visibility;
     if (!row_of(mask.report.technique).on_host)
         visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");
-    if (shows_behind(state.grounds, *receivers.depth, camera))
+    if (shows_behind(state.grounds, light_frame(state.light), *receivers.depth, camera))
         mask.report.warnings.emplace_back("receivers lie behind ground that the occluder map was not fitted to: prepared for other receivers, it may miss "
                                           "what casts on these");
     warn_of_dark_side(state.light, receivers, camera, mask.report);

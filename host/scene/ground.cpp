@@ -53,37 +53,55 @@ bool whole_light_before(const LightFrame& light, const Ground& ground)
     return ground.normal.dot(light.origin) - ground.offset > reach;
 }
 
-// How far a pixel's point lies behind is `constant` + depth x (`slope` + `slope_x` x column) in each row; orthographic: without the depth in the slopes.
-bool shows_behind(const Ground& ground, const DepthMap& depth, const Camera& camera)
+// Whether some of the light goes through the ground's box on its way to a point that lies behind.
+bool casts_on(const Ground& ground, const LightFrame& light, const Vec3& p)
 {
-    const auto height_at = [&](double x, double y, double z) {
-        return ground.offset - ground.normal.dot(world_point(camera, depth.width, depth.height, x, y, z));
-    };
-    std::size_t there = 0, near = 0, far = 0;
+    if (ground.box.isEmpty()) return true;
+    const double behind = ground.offset - ground.normal.dot(p), radius = std::max(light.half_u, light.half_v) * 1.5;
+    Vec3 crossing;
+    double reach;
+    if (light.directional) {
+        const double way = behind / std::max(-ground.normal.dot(light.direction), 1e-9);
+        crossing = p - light.direction * way;
+        reach = radius * way * 2; // tangents of angles, slanted
+    } else {
+        const double above = ground.normal.dot(light.origin) - ground.offset, part = behind / (behind + above);
+        crossing = p + (light.origin - p) * part;
+        reach = radius * part;
+    }
+    reach += tolerance_at(crossing) * 10;
+    const Vec3 wide(reach, reach, reach);
+    return Imath::Box3d(ground.box.min - wide, ground.box.max + wide).intersects(crossing);
+}
+
+// How far a pixel's point lies behind is constant + depth x (slope + spread x column) in each row; orthographic: without the depth in the slopes.
+bool shows_behind(const Ground& ground, const LightFrame& light, const DepthMap& depth, const Camera& camera)
+{
+    const auto point_at = [&](double x, double y, double z) { return world_point(camera, depth.width, depth.height, x, y, z); };
+    const auto behind_at = [&](double x, double y, double z) { return ground.offset - ground.normal.dot(point_at(x, y, z)); };
+    std::size_t there = 0, behind = 0;
     for (int y = 0; y < depth.height; ++y) {
-        const double row = y + .5, at_camera = height_at(.5, row, 0), at_one = height_at(.5, row, 1);
+        const double row = y + .5, at_camera = behind_at(.5, row, 0), at_one = behind_at(.5, row, 1);
         const auto slope = static_cast<float>(at_one - at_camera), constant = static_cast<float>(at_camera);
-        const double step = camera.orthographic ? height_at(1.5, row, 0) - at_camera : height_at(1.5, row, 1) - at_one;
+        const double step = camera.orthographic ? behind_at(1.5, row, 0) - at_camera : behind_at(1.5, row, 1) - at_one;
         const auto across = static_cast<float>(camera.orthographic ? step : 0), spread = static_cast<float>(camera.orthographic ? 0 : step);
         const float* z = &depth.depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width)];
         for (int x = 0; x < depth.width; ++x) {
+            if (!(z[x] > 0 && z[x] < std::numeric_limits<float>::infinity())) continue;
+            ++there;
             const auto column = static_cast<float>(x);
-            const float behind = constant + across * column + z[x] * (slope + spread * column);
-            const bool seen = z[x] > 0 && z[x] < std::numeric_limits<float>::infinity();
-            there += seen;
-            near += seen && behind > .03f * z[x];
-            far += seen && behind > .1f * z[x];
+            if (constant + across * column + z[x] * (slope + spread * column) > .03f * z[x]) behind += casts_on(ground, light, point_at(x + .5, row, z[x]));
         }
     }
-    return far > 0 || near * 500 > there;
+    return depth.from_image ? behind * 500 > there : behind > 0;
 }
 
-bool all_before(const Object& object, const Ground& ground)
+bool all_before(const Object& object, const LightFrame& light, const Ground& ground)
 {
     const auto before = [&](const Vec3& p) { return ground.normal.dot(p) - ground.offset >= -tolerance_at(p); };
     for (const Imath::V3f& p : object.mesh.positions)
         if (!before(Vec3(p))) return false;
-    return !object.seen || !shows_behind(ground, object.seen->depth, object.seen->camera);
+    return !object.seen || !shows_behind(ground, light, object.seen->depth, object.seen->camera);
 }
 
 } // namespace
@@ -94,9 +112,12 @@ std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object
     for (const Object& object : objects)
         for (const Ground& plane : planes_of(object.mesh)) {
             const double height = light.directional ? -plane.normal.dot(light.direction) : plane.normal.dot(light.origin) - plane.offset;
-            const Ground ground = height > 0 ? plane : Ground{-plane.normal, -plane.offset};
+            Ground ground = height > 0 ? plane : Ground{-plane.normal, -plane.offset};
             if (!whole_light_before(light, ground)) continue;
-            if (std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other, ground); })) grounds.push_back(ground);
+            for (const auto& triangle : object.mesh.triangles)
+                if (in_ground({ground}, object.mesh, triangle))
+                    for (const std::uint32_t corner : triangle) ground.box.extendBy(Vec3(object.mesh.positions[corner]));
+            if (std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other, light, ground); })) grounds.push_back(ground);
         }
     return grounds;
 }
@@ -116,9 +137,9 @@ bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh)
     return !grounds.empty() && std::all_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& triangle) { return in_ground(grounds, mesh, triangle); });
 }
 
-bool shows_behind(const std::vector<Ground>& grounds, const DepthMap& depth, const Camera& camera)
+bool shows_behind(const std::vector<Ground>& grounds, const LightFrame& light, const DepthMap& depth, const Camera& camera)
 {
-    return std::any_of(grounds.begin(), grounds.end(), [&](const Ground& ground) { return shows_behind(ground, depth, camera); });
+    return std::any_of(grounds.begin(), grounds.end(), [&](const Ground& ground) { return shows_behind(ground, light, depth, camera); });
 }
 
 } // namespace penumbra

@@ -14,6 +14,7 @@ namespace penumbra {
 struct Ground {
     Vec3 normal;
     double offset;
+    Imath::Box3d box = {}; // of the triangles that lie in it; empty: all of the plane
 };
 
 // The planes with the whole light and every object on one side of them (to a hundred-thousandth), among those in which a mesh has most of its area.
@@ -23,8 +24,9 @@ std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle);
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh);
 
-// Whether a depth image shows something on the far side of a ground, which could then cast on it: more than 2 in 1000 of its points lie behind by
-// 3 % of their depth, or any by 10 %. Nearer than that they may be the ground itself, as a noisy image shows it.
-bool shows_behind(const std::vector<Ground>& grounds, const DepthMap& depth, const Camera& camera);
+// Whether a depth image shows something on the far side of a ground that it casts on: more than 2 in 1000 of its points, or of exact depth any, lie
+// behind by 3 % of their depth, and on the way from there to the light is the ground's box, widened by the light. Nearer than that they may be the
+// ground itself, as a noisy image shows it.
+bool shows_behind(const std::vector<Ground>& grounds, const LightFrame& light, const DepthMap& depth, const Camera& camera);
 
 } // namespace penumbra

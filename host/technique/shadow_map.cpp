@@ -80,7 +80,7 @@ PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const Shad
 
 void shade(opencl::Work& work, const PreparedShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
 {
-    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
     shade_shadow_map(work, prepared, points, shaded.visibility);
 }

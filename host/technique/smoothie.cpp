@@ -287,7 +287,7 @@ PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoot
 
 void shade(opencl::Work& work, const PreparedSmoothie& prepared, const Receiving& receivers, Shaded& shaded)
 {
-    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
     shade_smoothie(work, prepared, points, shaded.visibility);
 }

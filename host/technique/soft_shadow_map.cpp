@@ -182,7 +182,7 @@ void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Rece
         shade_projected(work, prepared, receivers, shaded);
         return;
     }
-    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
     shade_soft_shadow_map(work, prepared, points, shaded.visibility, shaded.counts);
 }

@@ -11,9 +11,7 @@ ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera
     return receiver_points(work, receiver_view(camera, depth.width, depth.height, view), uploaded.memory(), depth.precision, program);
 }
 
-namespace {
-
-ReceiverPoints points_without_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
+ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
 {
     if (receivers.surface) {
         const DepthSurface& surface = *receivers.surface;
@@ -28,11 +26,9 @@ ReceiverPoints points_without_planes(opencl::Work& work, const Receiving& receiv
     return receiver_points(work, view, receivers.device_depth, 0x1p-24, program);
 }
 
-} // namespace
-
-ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
+ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
 {
-    ReceiverPoints points = points_without_planes(work, receivers, program);
+    ReceiverPoints points = points_of(work, receivers, program);
     if (receivers.normals) add_planes(work, points, *receivers.normals, program);
     return points;
 }

@@ -140,8 +140,10 @@ struct DeviceBuffers {
 };
 
 // Receiver points of depth that is on the host (uploaded in a stage of its own) or on the device already, for a technique whose `program`
-// has the kernel; with their planes where normals are known. The stage "receivers" or the running one is left running.
+// has the kernel. The stage "receivers" or the running one is left running.
 ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
+// The same with the receivers' planes, where their normals are known.
+ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
 ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera& camera, const Camera& view,
                          const opencl::Specialisation& program);
 
