@@ -52,9 +52,10 @@ struct TypeWords {
     }
     std::string operator()(const Numbers& numbers) const
     {
-        return numbers.count == 3 ? "`[x, y, z]`" : std::to_string(numbers.count) + " numbers";
+        return numbers.count == 3 ? "`[x, y, z]`" : numbers.count == 2 ? "`[x, y]`" : std::to_string(numbers.count) + " numbers";
     }
     std::string operator()(const LengthOrAuto&) const { return "above 0, or `\"auto\"`"; }
+    std::string operator()(const NameOrNumber&) const { return "string, or integer from 0"; }
     std::string operator()(const Pair&) const { return "`[x, y]` or one number, above 0"; }
     std::string operator()(const Size& size) const
     {
