@@ -191,6 +191,10 @@ std::vector<DepthAnchor> parse_anchors(const JsonValue& value, const JsonObject&
 {
     for (const char* solved : {"scale", "shift"})
         if (encoding.has(solved)) throw value.error(std::string("stands beside ") + solved, "expected one of the two: anchors are what it is solved from");
+    const auto& list = std::get<scene_file::List>(scene_file::key_of(scene_file::encoding(), "anchors").type);
+    const std::size_t count = value.elements().size();
+    if (count < list.low || count > list.high)
+        throw value.error("has " + std::to_string(count) + " anchors", "expected " + std::to_string(list.low) + " to " + std::to_string(list.high));
     std::vector<DepthAnchor> anchors;
     for (const JsonValue& element : value.elements()) {
         const JsonObject section = checked(element, scene_file::anchor());

@@ -113,6 +113,9 @@ enum ObjectForm { mesh_form, quad_form, depth_form };
 // The kind that a form asks for; empty: none.
 std::string_view kind_of(const Form& form);
 
+// The first key of that name in an object's forms, which has to be there.
+const Key& key_of(const Object& object, std::string_view name);
+
 // The names of an object's kinds, each once.
 std::vector<std::string_view> kinds_of(const Object& object);
 

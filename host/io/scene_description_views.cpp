@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include <penumbra/error.hpp>
+
 #include "scene/depth.hpp"
 
 namespace penumbra::scene_file {
@@ -166,11 +168,11 @@ Key near(bool zero_allowed)
             .example = "0.5"};
 }
 
-Key far(bool required)
+Key far(bool required, std::string_view meaning = "the depth that the furthest value stands for")
 {
     return {.name = "far",
             .type = Number{.low = 0, .above_low = true},
-            .meaning = "the depth that the furthest value stands for",
+            .meaning = meaning,
             .unit = "length",
             .required = required,
             .otherwise = required ? "" : "infinite",
@@ -266,7 +268,7 @@ const Object& encoding()
                 .example = R"([{"pixel": [0, 0], "depth": 2}, {"pixel": [3, 2], "depth": 5}])"}}),
          form("window", "of window depth", "a depth buffer, 0 at `near`, 1 at `far`, which is nothing there", {near(false), far(true)}),
          form("reversed_window", "of reversed_window depth", "a depth buffer, 1 at `near`, 0 at `far`, which is nothing there", {near(false), far(false)}),
-         form("normalized", "of normalized depth", "0 at `near`, 1 at `far`, linear; either may be the greater", {near(true), far(true)})}};
+         form("normalized", "of normalized depth", "0 at `near`, 1 at `far`, linear; either may be the greater", {near(true), far(true, "the depth that 1 stands for")})}};
     static_assert(static_cast<int>(EncodingKind::normalized) == 5, "the forms are in the order of EncodingKind");
     return object;
 }
@@ -379,6 +381,14 @@ std::string_view kind_of(const Form& form)
         if (const auto* constant = std::get_if<Constant>(&key.type))
             if (const auto* text = std::get_if<std::string_view>(&constant->value)) return *text;
     return {};
+}
+
+const Key& key_of(const Object& object, std::string_view name)
+{
+    for (const Form& form : object.forms)
+        for (const Key& key : form.keys)
+            if (key.name == name) return key;
+    throw Error(ErrorCode::internal, std::string(object.name) + " has no key " + std::string(name));
 }
 
 std::vector<std::string_view> kinds_of(const Object& object)

@@ -21,10 +21,12 @@ std::string link_to(std::string_view name)
     const std::string_view heading = name == "listed_light"                                                   ? "lights"
                                      : name == "object" || name == "quad"                                     ? "objects"
                                      : name == "occluders" || name == "receivers" || name == "occluder_depth" ? "occluders-and-receivers"
+                                     : name == "anchor"                                                       ? "encoding"
                                                                                                               : name;
     const std::string text = name == "listed_light"     ? "lights"
                              : name == "object"         ? "objects"
                              : name == "occluder_depth" ? "images"
+                             : name == "anchor"         ? "anchors"
                                                         : std::string(name);
     return "[" + text + "](#" + std::string(heading) + ")";
 }
