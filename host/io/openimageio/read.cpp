@@ -169,7 +169,8 @@ std::vector<ImagePart> parts_of(Source& source, const PartChoice& choice, std::s
     std::vector<ImagePart> parts{source.part()};
     const OIIO::ImageSpec first = source.spec();
     const bool said = !std::holds_alternative<std::monostate>(choice);
-    const int last = std::get_if<int>(&choice) && !source.exr() ? std::get<int>(choice) : source.exr() || said ? most_parts - 1 : 1;
+    // (Pages of a TIFF have no names to look for.)
+    const int last = source.exr() ? most_parts - 1 : std::get_if<int>(&choice) ? std::get<int>(choice) : said ? 0 : 1;
     for (int number = 1; number <= last && number < most_parts && source.seek(number); ++number) parts.push_back(source.part());
     if (source.exr() || said || parts.size() == 1) return parts;
     // A second page of another size is a smaller copy of the first.
