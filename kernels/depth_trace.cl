@@ -170,7 +170,7 @@ __kernel void depth_view(const DepthView view, const DepthSight sight, __global 
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= sight.width || y >= sight.height) return;
-    const float tx = (2 * x + 1 - sight.width) * 0.5f * sight.pixel_x, ty = (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y;
+    const float tx = (2 * x + 1 - sight.width) * 0.5f * sight.pixel_x + sight.off_x, ty = (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y + sight.off_y;
     const float3 eye = sight.orthographic ? (float3)(tx, ty, 0.0f) : (float3)(0.0f);
     const float3 way = sight.orthographic ? (float3)(0.0f, 0.0f, 1.0f) : (float3)(tx, ty, 1.0f);
     const float3 point = moved(sight.image_from_camera, eye), direction = turned(sight.image_from_camera, way);

@@ -26,7 +26,8 @@ inline float3 point_of(const DepthSight sight, const int i, const float z)
 {
     const int x = i % sight.width, y = i / sight.width;
     const float spread = sight.orthographic ? 1.0f : z;
-    return (float3)((2 * x + 1 - sight.width) * 0.5f * sight.pixel_x * spread, (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y * spread, z);
+    const float tx = (2 * x + 1 - sight.width) * 0.5f * sight.pixel_x + sight.off_x, ty = (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y + sight.off_y;
+    return (float3)(tx * spread, ty * spread, z);
 }
 
 // clip_at_horizon: visibility becomes the smaller of what it is and the share of the light above the receiver's plane.

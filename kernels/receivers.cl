@@ -39,8 +39,8 @@ __kernel void receivers_from_depth(const ReceiverView view, __global const float
     const float z = depth[min(y, view.height - 1) * view.width + min(x, view.width - 1)];
     const bool there = x < view.width && y < view.height && as_int(z) > 0 && as_int(z) < 0x7f800000;
     const float spread = view.camera_orthographic ? 1.0f : z;
-    const float px = (2 * x + 1 - view.width) * view.pixel_x * spread;
-    const float py = (view.height - 2 * y - 1) * view.pixel_y * spread;
+    const float px = ((2 * x + 1 - view.width) * view.pixel_x + view.off_x) * spread;
+    const float py = ((view.height - 2 * y - 1) * view.pixel_y + view.off_y) * spread;
     store_receiver(view, y * view.stride + x, there, px, py, z, xi, eta, d);
 }
 

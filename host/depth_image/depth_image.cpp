@@ -17,8 +17,8 @@ DepthView view_of(const Camera& camera, int width, int height)
     view.height = height;
     view.pixel_x = static_cast<float>(2 * camera.half_extent.x / width);
     view.pixel_y = static_cast<float>(2 * camera.half_extent.y / height);
-    view.middle_x = static_cast<float>(width) / 2;
-    view.middle_y = static_cast<float>(height) / 2;
+    view.middle_x = static_cast<float>((1 - camera.off_axis.x / camera.half_extent.x) * width / 2);
+    view.middle_y = static_cast<float>((1 + camera.off_axis.y / camera.half_extent.y) * height / 2);
     view.orthographic = camera.orthographic;
     int offset = 0;
     for (int level = 0; level < DEPTH_LEVELS; ++level) {
@@ -136,7 +136,7 @@ DepthSurface depth_surface(const DepthFit& fit, const Camera& camera)
             const std::size_t i = fit.index(x, y);
             if (!fit.shaded[i]) continue;
             // The pixel's ray: tangents, or lengths of an orthographic camera.
-            const double tx = (x + .5 - fit.width / 2.) * px, ty = (fit.height / 2. - y - .5) * py, value = fit.value[i];
+            const double tx = (x + .5 - fit.width / 2.) * px + camera.off_axis.x, ty = (fit.height / 2. - y - .5) * py + camera.off_axis.y, value = fit.value[i];
             // value = a + b tx + c ty on the plane.
             const double b = fit.slope_x[i] / px, c = -fit.slope_y[i] / py, z = fit.depth(i);
             Vec3 normal, ray, point;

@@ -41,6 +41,8 @@ void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, c
     const DepthSight sight{.image_from_camera = {},
                            .pixel_x = static_cast<float>(2 * horizon.camera.half_extent.x / horizon.width),
                            .pixel_y = static_cast<float>(2 * horizon.camera.half_extent.y / horizon.height),
+                           .off_x = static_cast<float>(horizon.camera.off_axis.x),
+                           .off_y = static_cast<float>(horizon.camera.off_axis.y),
                            .width = horizon.width,
                            .height = horizon.height,
                            .orthographic = horizon.camera.orthographic};

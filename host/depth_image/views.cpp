@@ -24,6 +24,8 @@ void add_view(opencl::Work& work, const DepthImage& image, const Camera& camera,
     set_transform(sight.image_from_camera, image.camera, camera);
     sight.pixel_x = static_cast<float>(2 * camera.half_extent.x / front.width);
     sight.pixel_y = static_cast<float>(2 * camera.half_extent.y / front.height);
+    sight.off_x = static_cast<float>(camera.off_axis.x);
+    sight.off_y = static_cast<float>(camera.off_axis.y);
     sight.width = front.width;
     sight.height = front.height;
     sight.orthographic = camera.orthographic;

@@ -64,12 +64,17 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
             ErrorCode::invalid_input, "occluders.camera", "is not the light's own view",
             "expected kind \"light\", or a pinhole at the light's centre along its axes; depth from another camera can be given in "
             "objects");
+    // Within the same ten-thousandth of the image: a principal point in a few digits.
+    const Vec2 off(std::abs(camera.off_axis.x) / camera.half_extent.x, std::abs(camera.off_axis.y) / camera.half_extent.y);
+    if (std::max(off.x, off.y) > 1e-4)
+        throw Error::at(ErrorCode::invalid_input, "occluders.camera", "has its axis beside the image's middle",
+                        "expected the light's own view, without shift and with cx and cy in the middle; depth from another camera can be given in objects");
     return light_camera(frame, camera.half_extent, frame.origin);
 }
 
 CameraSpec explicit_spec(const CameraSpec& spec, const Camera& camera)
 {
-    if (std::holds_alternative<PinholeCamera>(spec)) return PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent};
+    if (std::holds_alternative<PinholeCamera>(spec)) return PinholeCamera{.frame = camera.frame, .tan_half_fov = camera.half_extent, .shift = camera.off_axis / camera.half_extent / 2.};
     if (camera.orthographic) return LightCamera{.tan_half_fov = {}, .half_extent = camera.half_extent, .center = camera.frame.origin};
     return LightCamera{.tan_half_fov = camera.half_extent, .half_extent = {}, .center = {}};
 }

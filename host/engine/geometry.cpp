@@ -79,7 +79,7 @@ std::shared_ptr<const DepthSurface> Geometry::State::surface_of_same(const Depth
         if (!surfaces_[i]) continue;
         const SeenSurface& seen = *(*objects)[i].seen;
         const DepthMap& own = seen.depth;
-        const bool same_camera = same_frame(seen.camera.frame, camera.frame) && seen.camera.half_extent == camera.half_extent && seen.camera.orthographic == camera.orthographic;
+        const bool same_camera = same_frame(seen.camera.frame, camera.frame) && seen.camera.half_extent == camera.half_extent && seen.camera.off_axis == camera.off_axis && seen.camera.orthographic == camera.orthographic;
         if (same_camera && own.width == depth.width && own.height == depth.height && own.noise == depth.noise && own.depth == depth.depth) return surfaces_[i];
     }
     return nullptr;

@@ -52,7 +52,8 @@ public:
     {
         exr_chunk_info_t info = {};
         if (exr_read_scanline_chunk_info(context_, 0, row, &info) != EXR_ERR_SUCCESS || info.packed_size > info.unpacked_size ||
-            info.packed_size < info.unpacked_size / most_inflated)
+            info.packed_size < info.unpacked_size / most_inflated ||
+            (info.compression == EXR_COMPRESSION_NONE && info.packed_size != info.unpacked_size))
             return false;
         const bool first = !chunk_.context;
         if ((first ? exr_decoding_initialize(context_, 0, &info, &chunk_) : exr_decoding_update(context_, 0, &info, &chunk_)) !=
@@ -97,24 +98,23 @@ private:
 };
 
 // What the header says, if it is of the kind that is read here.
-bool is_plain(exr_const_context_t context, const exr_attr_box2i_t& data, const exr_attr_chlist_t& channels)
+bool is_plain(exr_const_context_t context, const exr_attr_box2i_t& data, const exr_attr_box2i_t& display, const exr_attr_chlist_t& channels)
 {
     int parts = 0;
     exr_storage_t storage = EXR_STORAGE_LAST_TYPE;
     exr_compression_t compression = EXR_COMPRESSION_LAST_TYPE;
-    exr_attr_box2i_t display = {};
     if (exr_get_count(context, &parts) != EXR_ERR_SUCCESS || parts != 1 || exr_get_storage(context, 0, &storage) != EXR_ERR_SUCCESS ||
-        exr_get_compression(context, 0, &compression) != EXR_ERR_SUCCESS || exr_get_display_window(context, 0, &display) != EXR_ERR_SUCCESS)
+        exr_get_compression(context, 0, &compression) != EXR_ERR_SUCCESS)
         return false;
     const bool zip = compression == EXR_COMPRESSION_ZIP || compression == EXR_COMPRESSION_ZIPS;
     if (storage != EXR_STORAGE_SCANLINE || (!zip && compression != EXR_COMPRESSION_NONE)) return false;
-    if (std::memcmp(&data, &display, sizeof data) != 0 || channels.num_channels < 1) return false;
+    if (channels.num_channels < 1) return false;
     for (const char* turned : {"Orientation", "orientation"})
         if (const exr_attribute_t* found = nullptr; exr_get_attribute_by_name(context, 0, turned, &found) == EXR_ERR_SUCCESS) return false;
 
     // OpenEXR itself goes no further; and lengths in bytes must fit OpenEXRCore's 32 bits.
     constexpr std::int64_t furthest = INT32_MAX / 2, most_bytes = INT32_MAX;
-    for (const std::int64_t corner : {data.min.x, data.min.y, data.max.x, data.max.y})
+    for (const std::int64_t corner : {data.min.x, data.min.y, data.max.x, data.max.y, display.min.x, display.min.y, display.max.x, display.max.y})
         if (corner < -furthest || corner > furthest) return false;
     const std::int64_t columns = std::int64_t{data.max.x} - data.min.x + 1;
     if (columns > most_bytes / 4 / channels.num_channels) return false;
@@ -144,10 +144,10 @@ std::optional<PlainExr> PlainExr::open(std::span<const std::byte> exr)
     if (exr_start_read(&context, "image.exr", &settings) != EXR_ERR_SUCCESS) return {};
     file.context_.reset(context);
 
-    exr_attr_box2i_t data = {};
+    exr_attr_box2i_t data = {}, display = {};
     const exr_attr_chlist_t* channels = nullptr;
     if (exr_get_data_window(context, 0, &data) != EXR_ERR_SUCCESS || exr_get_channels(context, 0, &channels) != EXR_ERR_SUCCESS ||
-        !is_plain(context, data, *channels))
+        exr_get_display_window(context, 0, &display) != EXR_ERR_SUCCESS || !is_plain(context, data, display, *channels))
         return {};
     constexpr std::array types{SampleType::uint32, SampleType::float16, SampleType::float32};
     for (const auto& channel : std::span(channels->entries, static_cast<std::size_t>(channels->num_channels)))
@@ -155,8 +155,13 @@ std::optional<PlainExr> PlainExr::open(std::span<const std::byte> exr)
     file.width_ = data.max.x - data.min.x + 1;
     file.height_ = data.max.y - data.min.y + 1;
     file.first_row_ = data.min.y;
+    file.frame_ = {display.min.x - data.min.x, display.min.y - data.min.y, display.max.x - display.min.x + 1, display.max.y - display.min.y + 1};
+    float aspect = 1;
+    if (exr_get_pixel_aspect_ratio(context, 0, &aspect) == EXR_ERR_SUCCESS) file.pixel_aspect_ = static_cast<double>(aspect);
     return file;
 }
+
+bool PlainExr::whole() const { return frame_.x == 0 && frame_.y == 0 && frame_.width == width_ && frame_.height == height_; }
 
 std::optional<std::vector<float>> PlainExr::read(std::span<const std::size_t> picked) const
 {

@@ -11,6 +11,8 @@
 
 #include <penumbra/image.hpp>
 
+#include "scene/depth.hpp"
+
 struct _priv_exr_context_t;
 
 namespace penumbra {
@@ -20,7 +22,7 @@ struct ExrChannel {
     SampleType type = SampleType::float32; // uint32, float16 or float32
 };
 
-// One part of scanlines, uncompressed or ZIP, without subsampling, neither cropped nor turned.
+// One part of scanlines, uncompressed or ZIP, without subsampling, not turned.
 class PlainExr {
 public:
     // Nothing for another kind of EXR, and for one that is not sound: OpenImageIO says best what is wrong with it. The bytes must stay, and
@@ -29,6 +31,9 @@ public:
 
     int width() const { return width_; }
     int height() const { return height_; }
+    const ImageFrame& frame() const { return frame_; } // the display window, in the samples' pixels
+    bool whole() const; // nothing is cropped, nothing is beyond the display window
+    double pixel_aspect() const { return pixel_aspect_; }
     const std::vector<ExrChannel>& channels() const { return channels_; } // by name
 
     // The samples of some channels, interleaved, row 0 at the top; integers as stored. Nothing for a file that is broken. What is read here
@@ -44,6 +49,8 @@ private:
     std::shared_ptr<Source> source_;
     std::unique_ptr<_priv_exr_context_t, Finish> context_;
     int width_ = 0, height_ = 0, first_row_ = 0;
+    ImageFrame frame_;
+    double pixel_aspect_ = 1;
     std::vector<ExrChannel> channels_;
 };
 

@@ -35,26 +35,6 @@ ImageFormat format_from(std::span<const std::byte> bytes, std::string_view where
     return format;
 }
 
-// The depth channel, where the names alone say so; of the rest OpenImageIO's order decides.
-std::optional<std::size_t> plain_depth_channel(const std::vector<ExrChannel>& channels, std::string_view asked)
-{
-    const auto find = [&](const auto& fits) -> std::optional<std::size_t> {
-        const auto found = std::ranges::find_if(channels, fits, &ExrChannel::name);
-        if (found == channels.end()) return {};
-        return static_cast<std::size_t>(found - channels.begin());
-    };
-    if (!asked.empty()) return find([&](const std::string& name) { return name == asked; });
-    if (const auto z = find([](const std::string& name) { return name == "Z"; })) return z;
-    if (const auto z = find([](const std::string& name) { return name == "depth.Z"; })) return z;
-    const auto is_layer = [](const std::string& name) { return name.ends_with(".Depth.Z"); };
-    if (std::ranges::count_if(channels, is_layer, &ExrChannel::name) == 1) return find(is_layer);
-    // The only channel must not be alpha.
-    const std::string& first = channels.front().name;
-    const char initial = first[first.rfind('.') + 1]; // of the name behind the layer; 0 when there is none
-    if (channels.size() == 1 && initial != 'A' && initial != 'a') return 0;
-    return {};
-}
-
 // The channels of an image in the order of its pixels, where the names alone say so: one, RGB, or RGB and alpha. EXR sorts them by name.
 std::vector<std::size_t> plain_image_channels(const std::vector<ExrChannel>& channels)
 {
@@ -80,21 +60,44 @@ std::optional<PlainExr> plain_exr(std::span<const std::byte> exr, std::string_vi
     return file;
 }
 
-std::optional<RawDepth> plain_depth(std::span<const std::byte> exr, std::string_view channel, std::string_view where,
-                                    std::uint64_t max_samples)
+// The one part of a plain EXR.
+ImagePart part_of(const PlainExr& file)
+{
+    ImagePart part;
+    for (const ExrChannel& channel : file.channels()) part.channels.push_back(channel.name);
+    return part;
+}
+
+// Names of parts stand where OpenImageIO alone looks.
+bool may_be_plain(const PartChoice& choice) { return !std::holds_alternative<std::string>(choice); }
+
+std::optional<RawPlanes> plain_planes(std::span<const std::byte> exr, const PlaneRequest& request, std::string_view where, std::uint64_t max_samples)
 {
     const std::optional<PlainExr> file = plain_exr(exr, where, max_samples);
-    const std::optional<std::size_t> picked = file ? plain_depth_channel(file->channels(), channel) : std::nullopt;
-    if (!picked) return {};
-    std::optional<std::vector<float>> samples = file->read(std::array{*picked});
+    if (!file || !may_be_plain(request.part)) return {};
+    PlanePick pick;
+    try {
+        pick = pick_planes(std::array{part_of(*file)}, request, where);
+    } catch (const Error&) {
+        return {}; // OpenImageIO lists channels as people do, R before G
+    }
+    check_frame(file->frame(), where, max_samples);
+    const std::vector<std::size_t> picked(pick.channels.begin(), pick.channels.end());
+    std::optional<std::vector<float>> samples = file->read(picked);
     if (!samples) return {};
-    return RawDepth{file->width(), file->height(), file->channels()[*picked].type, std::move(*samples)};
+    return RawPlanes{.width = file->width(),
+                     .height = file->height(),
+                     .channels = static_cast<int>(picked.size()),
+                     .type = file->channels()[picked.front()].type,
+                     .samples = std::move(*samples),
+                     .frame = file->frame(),
+                     .pixel_aspect = sound_aspect(file->pixel_aspect())};
 }
 
 std::optional<Image> plain_image(std::span<const std::byte> exr, std::string_view where, std::uint64_t max_samples)
 {
     const std::optional<PlainExr> file = plain_exr(exr, where, max_samples);
-    const std::vector<std::size_t> picked = file ? plain_image_channels(file->channels()) : std::vector<std::size_t>();
+    const std::vector<std::size_t> picked = file && file->whole() ? plain_image_channels(file->channels()) : std::vector<std::size_t>();
     if (picked.empty()) return {};
     std::optional<std::vector<float>> samples = file->read(picked);
     if (!samples) return {};
@@ -108,23 +111,55 @@ Image png_image(PngImage&& png)
     return {png.width, png.height, png.channels, std::move(png.samples)};
 }
 
-// Grey is depth for certain; of colours, the one that is asked for.
-RawDepth png_depth(PngImage&& png, std::string_view channel, std::string_view where)
+// Some channels of interleaved ones.
+std::vector<float> picked_from(std::vector<float> samples, int channels, std::span<const int> picked)
 {
-    constexpr std::array<std::string_view, 4> names{"Y", "Y, A", "R, G, B", "R, G, B, A"};
-    const std::string_view list = names[static_cast<std::size_t>(png.channels - 1)];
-    const std::size_t channels = static_cast<std::size_t>(png.channels);
-    if (channel.empty() && channels > 2)
-        throw broken(where, "has no channel that is depth for certain; it has " + std::string(list), "name one with encoding.channel");
-    const std::size_t at = channel.empty() ? 0 : channel.size() == 1 ? list.find(channel) : std::string_view::npos;
-    if (at == std::string_view::npos) throw broken(where, "has no channel \"" + std::string(channel) + "\"; it has " + std::string(list));
-    RawDepth raw{png.width, png.height, png.bits == 16 ? SampleType::uint16 : SampleType::uint8, std::move(png.samples)};
-    if (channels == 1) return raw;
-    const std::size_t first = at / 3; // of "R, G, B, A"
-    const std::size_t count = raw.samples.size() / channels;
-    for (std::size_t i = 0; i < count; ++i) raw.samples[i] = raw.samples[channels * i + first];
-    raw.samples.resize(count);
-    return raw;
+    if (channels == 1) return samples;
+    const std::size_t count = samples.size() / static_cast<std::size_t>(channels);
+    std::vector<float> result;
+    result.reserve(count * picked.size());
+    for (std::size_t i = 0; i < count; ++i)
+        for (const int channel : picked) result.push_back(samples[i * static_cast<std::size_t>(channels) + static_cast<std::size_t>(channel)]);
+    return result;
+}
+
+// What a file of one part has: grey or RGB, and alpha behind it.
+ImagePart colours(int channels)
+{
+    static const std::array<std::vector<std::string>, 4> names{{{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}}};
+    return {.name = {}, .channels = names[static_cast<std::size_t>(channels - 1)]};
+}
+
+RawPlanes png_planes(PngImage&& png, const PlaneRequest& request, std::string_view where)
+{
+    const PlanePick pick = pick_planes(std::array{colours(png.channels)}, request, where);
+    return {.width = png.width,
+            .height = png.height,
+            .channels = static_cast<int>(pick.channels.size()),
+            .type = png.bits == 16 ? SampleType::uint16 : SampleType::uint8,
+            .samples = picked_from(std::move(png.samples), png.channels, pick.channels),
+            .frame = {},
+            .pixel_aspect = sound_aspect(png.pixel_aspect)};
+}
+
+RawPlanes pfm_planes(Image&& image, const PlaneRequest& request, std::string_view where)
+{
+    const PlanePick pick = pick_planes(std::array{colours(image.channels)}, request, where);
+    return {.width = image.width,
+            .height = image.height,
+            .channels = static_cast<int>(pick.channels.size()),
+            .type = SampleType::float32,
+            .samples = picked_from(std::move(image.pixels), image.channels, pick.channels)};
+}
+
+RawPlanes decode_planes(std::span<const std::byte> bytes, const PlaneRequest& request, std::string_view where, std::uint64_t max_samples)
+{
+    const ImageFormat format = format_from(bytes, where);
+    if (format == ImageFormat::pfm) return pfm_planes(decode_pfm(bytes, where, max_samples), request, where);
+    if (format == ImageFormat::png) return png_planes(decode_png(bytes, where, max_samples), request, where);
+    if (format == ImageFormat::exr)
+        if (std::optional<RawPlanes> planes = plain_planes(bytes, request, where, max_samples)) return *std::move(planes);
+    return openimageio().decode_planes(bytes, format, request, where, max_samples);
 }
 
 } // namespace
@@ -139,20 +174,22 @@ Image decode_image(std::span<const std::byte> bytes, std::string_view where, std
     return openimageio().decode_image(bytes, format, where, max_samples);
 }
 
-RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where, std::uint64_t max_samples)
+RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where, std::uint64_t max_samples,
+                          const PartChoice& part)
 {
-    const ImageFormat format = format_from(bytes, where);
-    if (format == ImageFormat::pfm) {
-        Image image = decode_pfm(bytes, where, max_samples);
-        if (image.channels != 1 || (!channel.empty() && channel != "Y"))
-            throw broken(where, image.channels == 1 ? "has no channel \"" + std::string(channel) + "\"; it has Y"
-                                                    : "is a colour PFM; depth needs one channel");
-        return {image.width, image.height, SampleType::float32, std::move(image.pixels)};
-    }
-    if (format == ImageFormat::png) return png_depth(decode_png(bytes, where, max_samples), channel, where);
-    if (format == ImageFormat::exr)
-        if (std::optional<RawDepth> raw = plain_depth(bytes, channel, where, max_samples)) return *std::move(raw);
-    return openimageio().decode_raw_depth(bytes, format, channel, where, max_samples);
+    RawPlanes planes = decode_planes(bytes, {.planes = Planes::depth, .channel = std::string(channel), .part = part}, where, max_samples);
+    return {.width = planes.width,
+            .height = planes.height,
+            .type = planes.type,
+            .samples = std::move(planes.samples),
+            .frame = planes.frame,
+            .pixel_aspect = planes.pixel_aspect};
+}
+
+RawPlanes decode_positions(std::span<const std::byte> bytes, std::string_view channel, std::string_view where, std::uint64_t max_samples,
+                           const PartChoice& part)
+{
+    return decode_planes(bytes, {.planes = Planes::position, .channel = std::string(channel), .part = part}, where, max_samples);
 }
 
 Image read_image(const std::string& path) { return decode_image(read_file(path, path), path); }

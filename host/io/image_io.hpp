@@ -10,6 +10,8 @@
 
 #include <penumbra/image.hpp>
 
+#include "io/depth_channel.hpp"
+#include "io/raw_planes.hpp"
 #include "scene/depth.hpp"
 
 namespace penumbra {
@@ -23,10 +25,13 @@ Image decode_image(std::span<const std::byte> bytes, std::string_view where, std
 // The same, and JPEG.
 Image decode_picture(std::span<const std::byte> bytes, std::string_view where, std::uint64_t max_samples = max_image_samples);
 
-// One depth channel, of the first part that has one. `channel` empty: Z, depth.Z, *.Depth.Z, OpenImageIO's own z channel, or the only
-// channel beside alpha; otherwise an error that lists the channels.
+// One depth channel: `channel`, or the one that is depth by its name; of `part` alone, where that is given (io/depth_channel.hpp).
 RawDepth decode_raw_depth(std::span<const std::byte> bytes, std::string_view channel, std::string_view where,
-                          std::uint64_t max_samples = max_image_samples);
+                          std::uint64_t max_samples = max_image_samples, const PartChoice& part = {});
+
+// A position a pixel, x, y and z: `channel` names the layer, "P" of P.X, P.Y and P.Z.
+RawPlanes decode_positions(std::span<const std::byte> bytes, std::string_view channel, std::string_view where,
+                           std::uint64_t max_samples = max_image_samples, const PartChoice& part = {});
 
 // An EXR with one float32 channel, Z.
 std::vector<std::byte> encode_depth(const DepthMap& depth);

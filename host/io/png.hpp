@@ -21,6 +21,7 @@ struct PngImage {
     int channels = 1;           // grey or RGB, and alpha behind it
     int bits = 8;               // 8 or 16
     std::vector<float> samples; // integers
+    double pixel_aspect = 1;    // a pixel's width over its height
 };
 
 // Samples as they stand: colour profiles and gamma are not applied. Palettes become colours, a transparent colour becomes alpha, and 1, 2

@@ -37,7 +37,7 @@ public:
         const bool colour = header_.color_type & SPNG_COLOR_TYPE_TRUECOLOR, alpha = clear || header_.color_type & 4;
         const int channels = (colour ? 3 : 1) + (alpha ? 1 : 0);
         check_size(channels, max_samples);
-        PngImage image{static_cast<int>(header_.width), static_cast<int>(header_.height), channels, header_.bit_depth == 16 ? 16 : 8, {}};
+        PngImage image{static_cast<int>(header_.width), static_cast<int>(header_.height), channels, header_.bit_depth == 16 ? 16 : 8, {}, pixel_aspect()};
         if (image.bits == 16)
             decode<std::uint16_t>(image, !clear ? SPNG_FMT_PNG : colour ? SPNG_FMT_RGBA16 : SPNG_FMT_GA16);
         else if (header_.color_type == SPNG_COLOR_TYPE_GRAYSCALE_ALPHA)
@@ -52,6 +52,14 @@ private:
     {
         if (result != 0)
             throw Error(ErrorCode::invalid_input, std::string(where_) + " is truncated or broken: PNG: " + spng_strerror(result));
+    }
+
+    // Pixels a unit each way; without them pixels are square.
+    double pixel_aspect() const
+    {
+        spng_phys density{};
+        if (spng_get_phys(context_.get(), &density) != 0 || density.ppu_x == 0 || density.ppu_y == 0) return 1;
+        return static_cast<double>(density.ppu_y) / density.ppu_x;
     }
 
     void check_size(int channels, std::uint64_t max_samples) const

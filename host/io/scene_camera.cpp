@@ -36,6 +36,19 @@ void orthonormalize(Frame& frame)
     frame.y = frame.z.cross(frame.x);
 }
 
+// The angles' rest: a lens in their place, and how the image is shifted.
+void read_lens(const JsonObject& section, PinholeCamera& camera)
+{
+    if (const auto lens = section.find("intrinsics")) {
+        const JsonObject k = checked(*lens, scene_file::intrinsics());
+        camera.intrinsics = {k.need("fx").number(), k.need("fy").number(), k.need("cx").number(), k.need("cy").number()};
+    }
+    if (const auto shift = section.find("shift")) {
+        const std::vector<double> by = shift->numbers(2);
+        camera.shift = {by[0], by[1]};
+    }
+}
+
 PinholeCamera read_matrix(const JsonObject& section)
 {
     const JsonValue matrix = section.need("world_from_camera");
@@ -44,7 +57,10 @@ PinholeCamera read_matrix(const JsonObject& section)
         throw matrix.error("ends in the row " + nlohmann::json({m[12], m[13], m[14], m[15]}).dump() + ", expected [0, 0, 0, 1]",
                            "row-major, for column vectors: the translation is in elements 3, 7 and 11");
     PinholeCamera camera{{{m[3], m[7], m[11]}, {m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}},
-                         section.need("tan_half_fov").positive_pair()};
+                         {1, 1}};
+    const JsonValue angles = checked_choice(section, scene_file::camera().forms[scene_file::matrix_camera_form]);
+    if (section.has("tan_half_fov")) camera.tan_half_fov = angles.positive_pair();
+    read_lens(section, camera);
     validate(Camera{camera.frame, false, camera.tan_half_fov}, section.value().key());
     orthonormalize(camera.frame);
     return camera;
@@ -73,7 +89,9 @@ PinholeCamera read_look_at(const JsonObject& section)
     if (!is_finite(camera.frame.x) || !is_finite(camera.frame.y) || !is_finite(camera.frame.z))
         throw section.value().error("eye, target and up are too far apart for the view to be computed");
 
-    const JsonValue fov = section.need("vertical_fov_deg");
+    read_lens(section, camera);
+    const JsonValue fov = checked_choice(section, scene_file::camera().forms[scene_file::looking_camera_form]);
+    if (camera.intrinsics) return camera;
     const double degrees = fov.number();
     camera.tan_half_fov = {0, std::tan(degrees * std::numbers::pi / 360)}; // x: from the image's aspect ratio
     if (!(camera.tan_half_fov.y > 0)) throw fov.expected("an angle that is not all but 0");

@@ -1,6 +1,7 @@
 #include "io/scene_check.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace penumbra {
 
@@ -47,6 +48,13 @@ struct Check {
         if (value.json().is_string() && value.json() == "auto") return;
         if (!value.json().is_number() || !(value.number() > 0)) throw value.expected("a number above 0, or \"auto\"");
     }
+    void operator()(const NameOrNumber&) const
+    {
+        if (value.json().is_string())
+            value.text();
+        else
+            value.integer(0, std::numeric_limits<int>::max());
+    }
     void operator()(const Pair&) const { value.positive_pair(); }
     void operator()(const Size& size) const
     {
@@ -84,6 +92,17 @@ JsonObject checked(const JsonValue& value, const Form& form)
         if (const auto member = section.find(key.name)) std::visit(Check{*member}, key.type);
     }
     return section;
+}
+
+JsonValue checked_choice(const JsonObject& section, const Form& form)
+{
+    std::optional<JsonValue> found;
+    for (const std::string_view key : form.exactly_one) {
+        const auto member = section.find(key);
+        if (member && found) throw member->error("stands beside " + found->key().substr(found->key().rfind('.') + 1), "expected one of the two");
+        if (member) found = member;
+    }
+    return found ? *found : section.need(form.exactly_one.front());
 }
 
 JsonObject checked(const JsonValue& value, const scene_file::Object& object) { return checked(value, object.forms.front()); }

@@ -13,6 +13,9 @@ JsonObject checked(const JsonValue& value, const scene_file::Form& form);
 // In its only form.
 JsonObject checked(const JsonValue& value, const scene_file::Object& object);
 
+// The only one there is of the form's keys that exclude each other. Throws when there are several, or, for the first, that it is missing.
+JsonValue checked_choice(const JsonObject& section, const scene_file::Form& form);
+
 // Which of the object's kinds it is, by its place in kinds_of.
 std::size_t kind_index(const JsonValue& value, const scene_file::Object& object);
 

@@ -200,8 +200,13 @@ const Object& object()
           .keys = placed({{.name = "depth",
                            .type = File{},
                            .meaning = "image of depth; its surfaces are fitted and traced in the image itself",
-                           .required = true,
+                           .otherwise = "`position`",
                            .example = "\"view.exr\""},
+                          {.name = "position",
+                           .type = File{},
+                           .meaning = "image of world positions, in place of `depth`; three channels",
+                           .otherwise = "`depth`",
+                           .example = "\"position.exr\""},
                           {.name = "camera",
                            .type = One{camera},
                            .meaning = "the camera that saw it",
@@ -209,7 +214,7 @@ const Object& object()
                            .example = R"({"kind": "pinhole", "eye": [0, 2, 5], "target": [0, 0, 0], "vertical_fov_deg": 40})"},
                           {.name = "encoding",
                            .type = One{encoding},
-                           .meaning = "how `depth` stores depth",
+                           .meaning = "how the image stores depth",
                            .fallback = R"({"kind": "planar"})",
                            .example = R"({"kind": "radial"})"},
                           {.name = "thickness",
@@ -217,7 +222,8 @@ const Object& object()
                            .meaning = "of the bodies behind the surfaces; `\"auto\"`: round or mirrored bodies, from their silhouettes",
                            .unit = "length",
                            .fallback = "\"auto\"",
-                           .example = "0.2"}})}}};
+                           .example = "0.2"}}),
+          .exactly_one = {"depth", "position"}}}};
     return object;
 }
 
@@ -292,8 +298,8 @@ const Object& scene()
 
 std::span<const Object* const> objects()
 {
-    static const std::array all{&scene(),          &light(),     &listed_light(), &object(),   &quad(),  &occluders(),
-                                &occluder_depth(), &receivers(), &camera(),       &encoding(), &output()};
+    static const std::array all{&scene(),          &light(),     &listed_light(), &object(),     &quad(),     &occluders(), &occluder_depth(),
+                                &receivers(), &camera(),       &intrinsics(), &encoding(), &anchor(),    &output()};
     return all;
 }
 

@@ -40,6 +40,7 @@ struct Numbers { // a vector or matrix of that many
     std::size_t count;
 };
 struct LengthOrAuto {}; // a number above 0, or "auto"
+struct NameOrNumber {}; // a text, or a whole number from 0
 struct Pair {}; // [x, y], or one number for both; above 0
 struct Size {   // [width, height]
     std::int64_t low, high;
@@ -53,7 +54,7 @@ struct List { // of objects
 };
 struct TechniqueKeys {}; // a kind of technique_table() and its settings
 
-using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, LengthOrAuto, Pair, Size, One, List, TechniqueKeys>;
+using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, LengthOrAuto, NameOrNumber, Pair, Size, One, List, TechniqueKeys>;
 
 // --- Keys, forms, objects --------------------------------------------------------------------------------------------------------
 
@@ -95,6 +96,8 @@ const Object& occluders();
 const Object& occluder_depth();
 const Object& receivers();
 const Object& camera();
+const Object& intrinsics();
+const Object& anchor();
 const Object& encoding(); // forms in the order of EncodingKind
 const Object& output();
 
@@ -109,6 +112,9 @@ enum ObjectForm { mesh_form, quad_form, depth_form };
 
 // The kind that a form asks for; empty: none.
 std::string_view kind_of(const Form& form);
+
+// The first key of that name in an object's forms, which has to be there.
+const Key& key_of(const Object& object, std::string_view name);
 
 // The names of an object's kinds, each once.
 std::vector<std::string_view> kinds_of(const Object& object);

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include <penumbra/error.hpp>
 
 #include "scene/depth.hpp"
 
@@ -11,15 +14,31 @@ namespace {
 
 constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
 constexpr std::int64_t max_resolution = 65536;
+constexpr std::size_t most_anchors = 65536;
 
-Key tangents(bool required)
+Key tangents(std::string_view otherwise)
 {
     return {.name = "tan_half_fov",
             .type = Pair{},
             .meaning = "tangents of the half angles",
-            .required = required,
-            .otherwise = required ? "" : "fitted: of occluders to what casts, but for flat ground; else to the objects",
+            .otherwise = otherwise,
             .example = "[0.5, 0.5]"};
+}
+
+// Both ways of placing a pinhole have these.
+std::vector<Key> with_lens(std::vector<Key> keys)
+{
+    keys.push_back({.name = "intrinsics",
+                    .type = One{intrinsics},
+                    .meaning = "a calibrated camera's lens, in place of the angles",
+                    .otherwise = "the angles",
+                    .example = R"({"fx": 500, "fy": 500, "cx": 320, "cy": 240})"});
+    keys.push_back({.name = "shift",
+                    .type = Numbers{2},
+                    .meaning = "moves the image in its plane, to the right and up, by this many of its widths and heights",
+                    .fallback = "[0, 0]",
+                    .example = "[0.1, 0]"});
+    return keys;
 }
 
 Form light_camera()
@@ -27,7 +46,7 @@ Form light_camera()
     return {.name = "light",
             .of = "of a light's camera (half_extent and center are for directional lights)",
             .meaning = "at the light's centre along its axis; image x along +u, image up along +v",
-            .keys = {kind("light"), tangents(false)}};
+            .keys = {kind("light"), tangents("fitted: of occluders to what casts, but for flat ground; else to the objects")}};
 }
 
 Form sun_camera()
@@ -55,7 +74,7 @@ Form looking_camera()
     return {.name = "pinhole, looking",
             .of = "beside eye and target",
             .meaning = "at `eye`, towards `target`",
-            .keys = {kind("pinhole"),
+            .keys = with_lens({kind("pinhole"),
                      {.name = "eye",
                       .type = Numbers{3},
                       .meaning = "where the camera is",
@@ -75,10 +94,11 @@ Form looking_camera()
                       .example = "[1, 0, 0]"},
                      {.name = "vertical_fov_deg",
                       .type = Number{.low = 0, .high = 180, .above_low = true, .below_high = true},
-                      .meaning = "the image's whole height; the width follows its pixels",
+                      .meaning = "the image's whole height; the width follows its pixels, whose own aspect counts",
                       .unit = "degrees",
-                      .required = true,
-                      .example = "40"}}};
+                      .otherwise = "`intrinsics`",
+                      .example = "40"}}),
+            .exactly_one = {"vertical_fov_deg", "intrinsics"}};
 }
 
 Form matrix_camera()
@@ -86,27 +106,29 @@ Form matrix_camera()
     return {.name = "pinhole, by matrix",
             .of = "beside world_from_camera",
             .meaning = "placed by a matrix",
-            .keys = {kind("pinhole"),
+            .keys = with_lens({kind("pinhole"),
                      {.name = "world_from_camera",
                       .type = Numbers{16},
                       .meaning = "row-major, for column vectors: translation in elements 3, 7, 11; rigid, last row 0, 0, 0, 1",
                       .required = true,
                       .example = "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1]"},
-                     tangents(true)}};
+                     tangents("`intrinsics`")}),
+            .exactly_one = {"tan_half_fov", "intrinsics"}};
 }
 
 // Every encoding has these.
 std::vector<Key> stored(std::vector<Key> keys)
 {
     keys.push_back({.name = "scale",
-                    .type = Number{.low = 0, .above_low = true},
-                    .meaning = "multiplies the decoded depth",
+                    .type = Number{},
+                    .meaning = "multiplies the decoded depth; not 0, and below 0 where camera-space z is stored",
                     .fallback = "1",
                     .example = "0.5"});
     keys.push_back({.name = "empty",
                     .type = Number{},
                     .meaning = "the stored value that means nothing there",
-                    .otherwise = "what is not finite, not positive, or at least 1e9 (in a half-float image 65504)",
+                    .otherwise = "what is not finite, not positive (with a negative `scale` not negative), or at least 1e9 (in a half-float image 65504); in a "
+                                 "`window` 1",
                     .example = "0"});
     keys.push_back({.name = "precision",
                     .type = Number{.low = 0, .high = 1, .above_low = true},
@@ -116,26 +138,41 @@ std::vector<Key> stored(std::vector<Key> keys)
     keys.push_back({.name = "channel",
                     .type = Text{},
                     .meaning = "the image's channel",
-                    .otherwise = "`Z`, `depth.Z`, `*.Depth.Z`, or the only one beside alpha",
+                    .otherwise = "the one that is called depth (`Z`, `depth`, `*.Depth.Z`, `ZDepth.R`), or the only one beside alpha",
                     .example = "\"Z\""});
+    keys.push_back({.name = "part",
+                    .type = NameOrNumber{},
+                    .meaning = "the part of a multi-part EXR, or the page of a TIFF; numbers count from 0",
+                    .otherwise = "the one that holds the channel",
+                    .example = "\"depth\""});
     return keys;
+}
+
+// The kind that counts where none is said.
+Key default_kind(std::string_view name)
+{
+    Key key = kind(name);
+    key.required = false;
+    key.fallback = "\"planar\"";
+    return key;
 }
 
 Key near(bool zero_allowed)
 {
     return {.name = "near",
             .type = Number{.low = 0, .above_low = !zero_allowed},
-            .meaning = "the depth that the nearest value stands for; below `far`",
+            .meaning = zero_allowed ? "the depth that 0 stands for; not `far`, and above it where white is near"
+                                    : "the depth that the nearest value stands for; below `far`",
             .unit = "length",
             .required = true,
             .example = "0.5"};
 }
 
-Key far(bool required)
+Key far(bool required, std::string_view meaning = "the depth that the furthest value stands for")
 {
     return {.name = "far",
             .type = Number{.low = 0, .above_low = true},
-            .meaning = "the depth that the furthest value stands for",
+            .meaning = meaning,
             .unit = "length",
             .required = required,
             .otherwise = required ? "" : "infinite",
@@ -143,9 +180,9 @@ Key far(bool required)
 }
 
 // The keys that occluders and receivers share, around their depth.
-std::vector<Key> viewed(std::string_view camera_meaning, std::string_view resolution, Key depth)
+std::vector<Key> viewed(std::string_view camera_meaning, std::string_view resolution, Key depth, std::optional<Key> position = {})
 {
-    return {{.name = "camera",
+    std::vector<Key> keys{{.name = "camera",
              .type = One{camera},
              .meaning = camera_meaning,
              .fallback = R"({"kind": "light"})",
@@ -162,6 +199,8 @@ std::vector<Key> viewed(std::string_view camera_meaning, std::string_view resolu
              .meaning = "how these images store depth",
              .fallback = R"({"kind": "planar"})",
              .example = R"({"kind": "radial"})"}};
+    if (position) keys.insert(keys.end() - 1, *std::move(position));
+    return keys;
 }
 
 // Without the zeros behind the point.
@@ -207,6 +246,7 @@ const Object& encoding()
 {
     const auto form = [](std::string_view name, std::string_view of, std::string_view meaning, std::vector<Key> range) {
         range.insert(range.begin(), kind(name));
+        if (name == "planar") range.front() = default_kind(name);
         return Form{.name = name, .of = of, .meaning = meaning, .keys = stored(std::move(range))};
     };
     static const Object object{
@@ -220,11 +260,55 @@ const Object& encoding()
                 .meaning = "with it, 1 / depth = value x `scale` + `shift`; without, depth = `scale` / value",
                 .unit = "1 / length",
                 .otherwise = "none",
-                .example = "0.45"}}),
-         form("window", "of window depth", "a depth buffer, 0 at `near`, 1 at `far`", {near(false), far(true)}),
-         form("reversed_window", "of reversed_window depth", "a depth buffer, 1 at `near`, 0 at `far`", {near(false), far(false)}),
-         form("normalized", "of normalized depth", "0 at `near`, 1 at `far`, linear", {near(true), far(true)})}};
+                .example = "0.45"},
+               {.name = "anchors",
+                .type = List{anchor, 2, most_anchors},
+                .meaning = "pixels of known depth, in place of `scale` and `shift`, which are solved from them by least squares",
+                .otherwise = "none",
+                .example = R"([{"pixel": [0, 0], "depth": 2}, {"pixel": [3, 2], "depth": 5}])"}}),
+         form("window", "of window depth", "a depth buffer, 0 at `near`, 1 at `far`, which is nothing there", {near(false), far(true)}),
+         form("reversed_window", "of reversed_window depth", "a depth buffer, 1 at `near`, 0 at `far`, which is nothing there", {near(false), far(false)}),
+         form("normalized", "of normalized depth", "0 at `near`, 1 at `far`, linear; either may be the greater", {near(true), far(true, "the depth that 1 stands for")})}};
     static_assert(static_cast<int>(EncodingKind::normalized) == 5, "the forms are in the order of EncodingKind");
+    return object;
+}
+
+const Object& intrinsics()
+{
+    const auto key = [](std::string_view name, Type type, std::string_view meaning, std::string_view example) {
+        return Key{.name = name, .type = std::move(type), .meaning = meaning, .unit = "pixels", .required = true, .example = example};
+    };
+    constexpr Number length{.low = 0, .above_low = true};
+    static const Object object{"intrinsics",
+                               "A lens as calibration gives it. (0, 0) is the image's top left corner, (0.5, 0.5) the first pixel's middle.",
+                               {{.name = "intrinsics",
+                                 .of = {},
+                                 .meaning = {},
+                                 .keys = {key("fx", length, "focal length across", "500"), key("fy", length, "focal length down", "500"),
+                                          key("cx", Number{}, "where the viewing axis meets the image, from the left", "320"),
+                                          key("cy", Number{}, "the same, from the top", "240")}}}};
+    return object;
+}
+
+const Object& anchor()
+{
+    static const Object object{"anchor",
+                               "A pixel of known depth.",
+                               {{.name = "anchor",
+                                 .of = {},
+                                 .meaning = {},
+                                 .keys = {{.name = "pixel",
+                                           .type = Numbers{2},
+                                           .meaning = "column and row, from 0 at the top left",
+                                           .unit = "pixels",
+                                           .required = true,
+                                           .example = "[0, 0]"},
+                                          {.name = "depth",
+                                           .type = Number{.low = 0, .above_low = true},
+                                           .meaning = "planar depth there",
+                                           .unit = "length",
+                                           .required = true,
+                                           .example = "2"}}}}};
     return object;
 }
 
@@ -282,7 +366,12 @@ const Object& receivers()
                                                  .type = File{},
                                                  .meaning = "image of depth",
                                                  .otherwise = "rendered from `objects`",
-                                                 .example = "\"receiver.exr\""})}}};
+                                                 .example = "\"receiver.exr\""},
+                                                Key{.name = "position",
+                                                 .type = File{},
+                                                 .meaning = "image of world positions, in place of `depth`; needs a pinhole camera",
+                                                 .otherwise = "`depth`",
+                                                 .example = "\"position.exr\""})}}};
     return object;
 }
 
@@ -292,6 +381,14 @@ std::string_view kind_of(const Form& form)
         if (const auto* constant = std::get_if<Constant>(&key.type))
             if (const auto* text = std::get_if<std::string_view>(&constant->value)) return *text;
     return {};
+}
+
+const Key& key_of(const Object& object, std::string_view name)
+{
+    for (const Form& form : object.forms)
+        for (const Key& key : form.keys)
+            if (key.name == name) return key;
+    throw Error(ErrorCode::internal, std::string(object.name) + " has no key " + std::string(name));
 }
 
 std::vector<std::string_view> kinds_of(const Object& object)

@@ -70,7 +70,7 @@ TechniqueRequest default_technique(const JsonObject& root)
         if (!object.json().is_object()) continue;
         const auto casts = object.json().find("casts");
         if (casts != object.json().end() && *casts == false) continue;
-        (object.json().contains("depth") ? depth : other) = true;
+        (object.json().contains("depth") || object.json().contains("position") ? depth : other) = true;
     }
     TechniqueRequest request;
     if (depth && !other) request.kind = "depth_trace";

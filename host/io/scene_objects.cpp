@@ -42,18 +42,13 @@ Error with_names(const Error& error, const std::string& path, const std::string&
 SeenSurface read_depth_surface(const JsonObject& section, const Light& light, const Resources& resources,
                                 std::vector<std::string>& warnings)
 {
-    const JsonValue name = section.need("depth");
-    const JsonValue place = section.need("camera");
-    const CameraSpec spec = parse_camera(place, light);
+    const JsonValue name = checked_choice(section, scene_file::object().forms[scene_file::depth_form]);
     const auto given = section.find("encoding");
-    DepthMap map = load_depth(name, given ? parse_encoding(*given) : MapEncoding{}, spec, resources, warnings);
-    // There is nothing that a light's camera could be fitted to: this depth image is the object.
-    const Camera camera = resolve_camera(spec, light, {}, map.width, map.height, place.key());
-    if (std::none_of(map.depth.begin(), map.depth.end(), [](float depth) { return std::isfinite(depth); }))
-        warnings.push_back(name.key() + ": " + name.text() + " shows no surface");
+    SeenDepth seen = load_whole_depth({name, section.has("position")}, given ? parse_encoding(*given) : MapEncoding{}, section.need("camera"), light, resources,
+                                      warnings);
     const auto thickness = section.find("thickness");
     const bool given_thickness = thickness && thickness->json().is_number();
-    return {.depth = std::move(map), .camera = camera, .thickness = given_thickness ? thickness->number() : 0};
+    return {.depth = std::move(seen.map), .camera = seen.camera, .thickness = given_thickness ? thickness->number() : 0};
 }
 
 ObjectPlacement placement_of(const JsonObject& section)
@@ -113,7 +108,10 @@ void place(SeenSurface& seen, const JsonObject& section)
             throw section.value().error("has depths beyond float32", "scale is too large");
         depth = std::max(depth * scale, std::numeric_limits<float>::min());
     }
-    if (seen.camera.orthographic) seen.camera.half_extent *= placement.scale;
+    if (seen.camera.orthographic) {
+        seen.camera.half_extent *= placement.scale;
+        seen.camera.off_axis *= placement.scale;
+    }
     seen.depth.step.depth *= placement.scale;
     seen.depth.step.disparity /= placement.scale;
     seen.depth.step.unit *= placement.scale;
@@ -125,16 +123,16 @@ penumbra::Object parse_object(const JsonValue& value, const Light& light, const 
 {
     using namespace scene_file;
     const JsonObject given(value);
-    const int kinds = given.has("mesh") + given.has("quad") + given.has("depth");
-    if (kinds != 1) throw value.error("has " + std::to_string(kinds) + " of mesh, quad and depth, expected exactly one");
+    const int kinds = given.has("mesh") + given.has("quad") + given.has("depth") + given.has("position");
+    if (kinds != 1) throw value.error("has " + std::to_string(kinds) + " of mesh, quad, depth and position, expected exactly one");
     const ObjectForm form = given.has("mesh") ? mesh_form : given.has("quad") ? quad_form : depth_form;
     const JsonObject section = checked(value, scene_file::object().forms[form]);
 
     penumbra::Object object;
     if (const auto casts = section.find("casts")) object.casts = casts->flag();
     if (const auto receives = section.find("receives")) object.receives = receives->flag();
-    if (section.has("depth")) {
-        object.name = section.need("depth").text();
+    if (form == depth_form) {
+        object.name = section.need(section.has("depth") ? "depth" : "position").text();
         object.seen = read_depth_surface(section, light, resources, warnings);
         place(*object.seen, section);
     } else {

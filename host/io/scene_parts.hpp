@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/depth_channel.hpp"
 #include "io/json_value.hpp"
 #include <penumbra/scene_file.hpp>
 #include "scene/depth.hpp"
@@ -46,12 +47,30 @@ CameraSpec parse_camera(const JsonValue& value, const Light& light);
 struct MapEncoding {
     DepthEncoding depth;
     std::string channel; // empty: found by itself
+    PartChoice part;
 };
 MapEncoding parse_encoding(const JsonValue& value);
 
-// The map that `name` stands for. `camera` gives the tangents that radial depth needs.
-DepthMap load_depth(const JsonValue& name, const MapEncoding& encoding, const CameraSpec& camera, const Resources& resources,
+// An image of depth, or of positions.
+struct DepthFile {
+    JsonValue name;
+    bool positions = false;
+};
+
+// The map that a file stands for, of what `camera` sees: the file's frame, neither more nor less. A pinhole takes the image's pixel aspect.
+DepthMap load_depth(const DepthFile& file, const MapEncoding& encoding, CameraSpec& camera, const Resources& resources,
                     std::vector<std::string>& warnings);
+
+// All that a file holds, beyond its frame as well, with the camera that sees that. A light's camera needs all its parts.
+struct SeenDepth {
+    DepthMap map;
+    Camera camera;
+};
+SeenDepth load_whole_depth(const DepthFile& file, const MapEncoding& encoding, const JsonValue& camera, const Light& light, const Resources& resources,
+                           std::vector<std::string>& warnings);
+
+// A warning about an image without a single depth, with what its values look like.
+std::string nothing_in(const DepthFile& file, const MapEncoding& encoding, const Resources& resources);
 
 Occluders parse_occluders(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);
 Receivers parse_receivers(const JsonValue& value, const Light& light, const Resources& resources, std::vector<std::string>& warnings);

@@ -70,6 +70,7 @@ struct TypeSchema {
     {
         return {{"anyOf", {(*this)(Number{.low = 0, .above_low = true}), Json{{"const", "auto"}}}}};
     }
+    Json operator()(const NameOrNumber&) const { return {{"anyOf", {(*this)(Text{}), Json{{"type", "integer"}, {"minimum", 0}}}}}; }
     Json operator()(const Pair&) const
     {
         const Json above = (*this)(Number{.low = 0, .above_low = true});

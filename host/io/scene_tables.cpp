@@ -21,10 +21,12 @@ std::string link_to(std::string_view name)
     const std::string_view heading = name == "listed_light"                                                   ? "lights"
                                      : name == "object" || name == "quad"                                     ? "objects"
                                      : name == "occluders" || name == "receivers" || name == "occluder_depth" ? "occluders-and-receivers"
+                                     : name == "anchor"                                                       ? "encoding"
                                                                                                               : name;
     const std::string text = name == "listed_light"     ? "lights"
                              : name == "object"         ? "objects"
                              : name == "occluder_depth" ? "images"
+                             : name == "anchor"         ? "anchors"
                                                         : std::string(name);
     return "[" + text + "](#" + std::string(heading) + ")";
 }
@@ -52,9 +54,10 @@ struct TypeWords {
     }
     std::string operator()(const Numbers& numbers) const
     {
-        return numbers.count == 3 ? "`[x, y, z]`" : std::to_string(numbers.count) + " numbers";
+        return numbers.count == 3 ? "`[x, y, z]`" : numbers.count == 2 ? "`[x, y]`" : std::to_string(numbers.count) + " numbers";
     }
     std::string operator()(const LengthOrAuto&) const { return "above 0, or `\"auto\"`"; }
+    std::string operator()(const NameOrNumber&) const { return "string, or integer from 0"; }
     std::string operator()(const Pair&) const { return "`[x, y]` or one number, above 0"; }
     std::string operator()(const Size& size) const
     {

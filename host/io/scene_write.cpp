@@ -5,6 +5,8 @@
 
 #include <penumbra/scene_file.hpp>
 
+#include "scene/camera.hpp"
+
 namespace penumbra {
 
 using nlohmann::ordered_json;
@@ -69,11 +71,12 @@ ordered_json write_camera(const CameraSpec& spec, int width, int height)
     }
     const PinholeCamera& camera = std::get<PinholeCamera>(spec);
     const auto& [o, x, y, z] = camera.frame;
-    Vec2 tangents = camera.tan_half_fov;
-    if (tangents.x == 0) tangents.x = tangents.y * width / height;
-    return {{"kind", "pinhole"},
-            {"world_from_camera", {x.x, y.x, z.x, o.x, x.y, y.y, z.y, o.y, x.z, y.z, z.z, o.z, 0, 0, 0, 1}},
-            {"tan_half_fov", array(tangents)}};
+    const Camera view = pinhole_view(camera, width, height);
+    ordered_json json{{"kind", "pinhole"},
+                      {"world_from_camera", {x.x, y.x, z.x, o.x, x.y, y.y, z.y, o.y, x.z, y.z, z.z, o.z, 0, 0, 0, 1}},
+                      {"tan_half_fov", array(view.half_extent)}};
+    if (view.off_axis != Vec2(0, 0)) json["shift"] = array(view.off_axis / view.half_extent / 2.);
+    return json;
 }
 
 ordered_json write_technique(const TechniqueRequest& request)

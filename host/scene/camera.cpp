@@ -202,15 +202,34 @@ Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3
             .half_extent = half_extent};
 }
 
+Camera pinhole_view(const PinholeCamera& pinhole, int width, int height)
+{
+    Camera camera{.frame = pinhole.frame, .orthographic = false, .half_extent = pinhole.tan_half_fov, .off_axis = {0, 0}};
+    if (const auto& k = pinhole.intrinsics) {
+        camera.half_extent = {width / (2 * k->fx), height / (2 * k->fy)};
+        camera.off_axis = {(width / 2. - k->cx) / k->fx, (k->cy - height / 2.) / k->fy};
+    } else if (camera.half_extent.x == 0) {
+        camera.half_extent.x = camera.half_extent.y * pinhole.pixel_aspect * width / height;
+    }
+    camera.off_axis += camera.half_extent * pinhole.shift * 2.;
+    return camera;
+}
+
+Camera part_of_view(const Camera& camera, int of_width, int of_height, int x, int y, int width, int height)
+{
+    const Vec3 middle = camera_point(camera, of_width, of_height, x + width / 2., y + height / 2., 1);
+    Camera part = camera;
+    part.half_extent = {camera.half_extent.x * width / of_width, camera.half_extent.y * height / of_height};
+    part.off_axis = {middle.x, middle.y};
+    return part;
+}
+
 Camera resolve_camera(const CameraSpec& spec, const Light& light, const std::vector<Object>& objects, int width, int height,
                       std::string_view where, const LeftOut& left_out)
 {
     Camera camera;
     if (const auto* pinhole = std::get_if<PinholeCamera>(&spec)) {
-        const Vec2 tangent = pinhole->tan_half_fov;
-        camera = {.frame = pinhole->frame,
-                  .orthographic = false,
-                  .half_extent = {tangent.x != 0 ? tangent.x : tangent.y * width / height, tangent.y}};
+        camera = pinhole_view(*pinhole, width, height);
     } else {
         const LightFrame frame = light_frame(light);
         const auto& of_light = std::get<LightCamera>(spec);
@@ -238,13 +257,15 @@ void validate(const Camera& camera, std::string_view where)
         if (!(half > 0) || !std::isfinite(half))
             throw Error::at(ErrorCode::invalid_input, std::string(where) + (camera.orthographic ? ".half_extent" : ".tan_half_fov"),
                             "is " + std::to_string(half), "expected positive finite numbers: a camera needs a field of view");
+    if (!std::isfinite(camera.off_axis.x) || !std::isfinite(camera.off_axis.y))
+        throw Error::at(ErrorCode::invalid_input, std::string(where), "the image's middle is not at a finite angle", "expected finite numbers");
 }
 
 Vec3 camera_point(const Camera& camera, int width, int height, double x_px, double y_px, double depth)
 {
     const double spread = camera.orthographic ? 1 : depth;
-    const double x = (2 * x_px / width - 1) * camera.half_extent.x * spread;
-    const double y = (1 - 2 * y_px / height) * camera.half_extent.y * spread;
+    const double x = ((2 * x_px / width - 1) * camera.half_extent.x + camera.off_axis.x) * spread;
+    const double y = ((1 - 2 * y_px / height) * camera.half_extent.y + camera.off_axis.y) * spread;
     return {x, y, depth};
 }
 
@@ -259,8 +280,9 @@ Projected project(const Camera& camera, int width, int height, const Vec3& world
     const Vec3 p = world - camera.frame.origin;
     const double depth = -p.dot(camera.frame.z);
     const double spread = camera.orthographic ? 1 : depth;
-    return {.x_px = (p.dot(camera.frame.x) / (spread * camera.half_extent.x) + 1) / 2 * width,
-            .y_px = (1 - p.dot(camera.frame.y) / (spread * camera.half_extent.y)) / 2 * height,
+    const double x = p.dot(camera.frame.x) / spread - camera.off_axis.x, y = p.dot(camera.frame.y) / spread - camera.off_axis.y;
+    return {.x_px = (x / camera.half_extent.x + 1) / 2 * width,
+            .y_px = (1 - y / camera.half_extent.y) / 2 * height,
             .depth = depth};
 }
 

@@ -21,6 +21,13 @@ struct LeftOut {
 // The camera of the light, looking along its direction, image x along u, image up along v.
 Camera light_camera(const LightFrame& light, const Vec2& half_extent, const Vec3& center);
 
+// The view of a pinhole through an image of this size.
+Camera pinhole_view(const PinholeCamera& pinhole, int width, int height);
+
+// The camera whose whole image is `width` x `height` pixels of another's, of which the top left corner lies at (x, y) of its `of_width` x
+// `of_height`; it may reach beyond.
+Camera part_of_view(const Camera& camera, int of_width, int of_height, int x, int y, int width, int height);
+
 // Makes a camera ready. A light's camera with parts left out is fitted to the objects that cast or receive, but for what is left
 // out, as long as others are left; throws invalid_input ("<where>.tan_half_fov: ...") when there is nothing to fit to, or when
 // objects lie at or behind the light's plane all round.

@@ -1,7 +1,10 @@
 #include "scene/depth.hpp"
+#include "scene/stored_depth.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
 #include <string>
 
 #include <penumbra/error.hpp>
@@ -9,17 +12,12 @@
 namespace penumbra {
 namespace {
 
-constexpr float far_away = 1e9f;         // at and above this a stored value means nothing there (docs/scene_file.md, encoding)
-constexpr float half_far_away = 65504.f; // the largest half-float
-
-bool in_unit_range(EncodingKind kind)
+std::string number(double value)
 {
-    return kind == EncodingKind::window || kind == EncodingKind::reversed_window || kind == EncodingKind::normalized;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
 }
-
-bool is_integer(SampleType type) { return type == SampleType::uint8 || type == SampleType::uint16 || type == SampleType::uint32; }
-
-double largest_integer(SampleType type) { return type == SampleType::uint8 ? 255.0 : type == SampleType::uint16 ? 65535.0 : 4294967295.0; }
 
 void check_range(const DepthEncoding& encoding, const std::string& where)
 {
@@ -29,12 +27,13 @@ void check_range(const DepthEncoding& encoding, const std::string& where)
         throw Error(ErrorCode::invalid_input, where + ": encoding needs near and far",
                     "expected two lengths; far may be left out of reversed_window alone, where it then is infinite");
     const double lowest = encoding.kind == EncodingKind::normalized ? 0 : std::nextafter(0.0, 1.0);
+    const bool either_way = encoding.kind == EncodingKind::normalized; // white may be near
+    const bool apart = !encoding.far || *encoding.near < *encoding.far || (either_way && *encoding.near > *encoding.far);
     if (!(std::isfinite(*encoding.near) && *encoding.near >= lowest) ||
-        (encoding.far && !(*encoding.near < *encoding.far && std::isfinite(*encoding.far))))
+        (encoding.far && !(apart && *encoding.far >= lowest && std::isfinite(*encoding.far))))
         throw Error(ErrorCode::invalid_input,
-                    where + ": encoding has near " + std::to_string(*encoding.near) + " and far " +
-                        (encoding.far ? std::to_string(*encoding.far) : "infinite"),
-                    "expected 0 < near < far");
+                    where + ": encoding has near " + number(*encoding.near) + " and far " + (encoding.far ? number(*encoding.far) : "infinite"),
+                    either_way ? "expected two lengths that differ, 0 or more" : "expected 0 < near < far");
 }
 
 void check_type(const RawDepth& raw, const DepthEncoding& encoding, const std::string& where, std::vector<std::string>& warnings)
@@ -45,13 +44,6 @@ void check_type(const RawDepth& raw, const DepthEncoding& encoding, const std::s
     if (raw.type == SampleType::uint8) warnings.push_back(where + " is 8-bit: 256 depths at most, shadows will show steps");
     if (raw.type == SampleType::float16)
         warnings.push_back(where + " is half-float: depth is right to 1 part in 2048 at best; float32 is better");
-}
-
-bool is_empty(float stored, const RawDepth& raw, const DepthEncoding& encoding)
-{
-    if (encoding.empty) return stored == static_cast<float>(*encoding.empty) || !std::isfinite(stored);
-    const float limit = raw.type == SampleType::float16 ? half_far_away : far_away;
-    return !std::isfinite(stored) || stored <= 0 || (!is_integer(raw.type) && stored >= limit);
 }
 
 // Depth, in the encoding's own measure, of a stored value that is there. `value` is 0 to 1 for the kinds that say so.
@@ -84,17 +76,13 @@ double precision_of(const RawDepth& raw, const DepthEncoding& encoding)
     double worst = 0x1p-24;
     for (const float stored : raw.samples) {
         if (is_empty(stored, raw, encoding)) continue;
-        const double value = in_unit_range(encoding.kind) ? stored / largest_integer(raw.type) : stored;
+        const double value = unit_value(stored, raw.type, encoding.kind);
         const double here = decode(value, encoding);
         const double there = decode(value + (value > step ? -step : step), encoding);
-        if (here > 0 && std::isfinite(there)) worst = std::max(worst, std::abs(there - here) / here);
+        if (here != 0 && std::isfinite(there)) worst = std::max(worst, std::abs((there - here) / here));
     }
     return worst;
 }
-
-} // namespace
-
-namespace {
 
 // How far apart the depths of neighbouring stored numbers are.
 DepthStep step_of(const RawDepth& raw, const DepthEncoding& encoding)
@@ -133,56 +121,113 @@ DepthMap map_of(const RawDepth& raw, const DepthEncoding& encoding, double preci
 
 } // namespace
 
-DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
-                      std::vector<std::string>& warnings)
+namespace {
+
+// Values of which the sign is wrong, where others are depth: one marker alone means nothing there, several are a program's mistake or ours.
+void warn_of_other_sign(const RawDepth& raw, const DepthEncoding& encoding, const std::string& at, std::vector<std::string>& warnings)
+{
+    const float sign = is_flipped(encoding) ? -1 : 1;
+    std::size_t count = 0;
+    float least = 0, greatest = -std::numeric_limits<float>::max();
+    for (const float stored : raw.samples) {
+        const float value = stored * sign;
+        if (!(value < 0) || !std::isfinite(value)) continue;
+        ++count;
+        least = std::min(least, value);
+        greatest = std::max(greatest, value);
+    }
+    if (count == 0 || least == greatest) return;
+    warnings.push_back(at + ": " + std::to_string(count) + (sign < 0 ? " values are positive" : " values are negative") + " (down to " +
+                       number(least * sign) + ") and count as nothing there; what stands for that, encoding.empty can say");
+}
+
+// Depth may be missing everywhere, but not because its sign is wrong.
+void check_sign(const RawDepth& raw, const DepthEncoding& encoding, const std::string& at, std::vector<std::string>& warnings)
+{
+    if (encoding.empty) return; // a sign that is wrong is an error of its own
+    const bool flipped = is_flipped(encoding);
+    const auto other_sign = [&](float stored) { return std::isfinite(stored) && (flipped ? stored > 0 : stored < 0); };
+    if (std::ranges::none_of(raw.samples, other_sign)) return;
+    if (std::ranges::any_of(raw.samples, [&](float stored) { return !is_empty(stored, raw, encoding); }))
+        return warn_of_other_sign(raw, encoding, at, warnings);
+    throw Error(ErrorCode::invalid_input, at + " holds no depth, its values are " + (flipped ? "positive: " : "negative: ") + values_text(raw),
+                flipped ? "expected negative values with a negative scale"
+                        : "a program that writes camera-space z needs \"scale\": -1 in its encoding; if they mean nothing there, set \"empty\"");
+}
+
+// Planar depth is what is wanted: nothing but what means nothing there is replaced. As is_empty says, for every sample at once.
+void replace_empty(std::vector<float>& samples, SampleType type)
+{
+    const float end = is_integer(type) ? std::numeric_limits<float>::infinity() : far_end(type);
+    for (float& stored : samples) stored = stored > 0 && stored < end ? stored : nothing_there;
+}
+
+// Distance to the camera's centre over planar depth, at each pixel.
+struct RadialStretch {
+    int width, height;
+    Vec2 half_extent, center;
+
+    double at(std::size_t i) const
+    {
+        const auto column = static_cast<double>(i % static_cast<std::size_t>(width)), row = static_cast<double>(i / static_cast<std::size_t>(width));
+        const double x = (2 * (column + 0.5) / width - 1) * half_extent.x + center.x;
+        const double y = (1 - 2 * (row + 0.5) / height) * half_extent.y + center.y;
+        return std::sqrt(1 + x * x + y * y);
+    }
+};
+
+} // namespace
+
+DepthMap decode_depth(RawDepth raw, const DepthEncoding& given, const Vec2& half_extent, std::string_view where,
+                      std::vector<std::string>& warnings, const Vec2& center)
 {
     const std::string at(where);
-    check_range(encoding, at);
-    check_type(raw, encoding, at, warnings);
-    if (!(encoding.scale > 0) || !std::isfinite(encoding.scale))
-        throw Error(ErrorCode::invalid_input, at + ": encoding.scale is " + std::to_string(encoding.scale), "expected a positive number");
+    check_range(given, at);
+    check_type(raw, given, at, warnings);
+    if (given.scale == 0 || !std::isfinite(given.scale))
+        throw Error(ErrorCode::invalid_input, at + ": encoding.scale is " + number(given.scale), "expected a number that is not 0");
+    const DepthEncoding encoding = solved(given, raw, at, warnings);
+    check_sign(raw, encoding, at, warnings);
 
-    // Planar depth is what is wanted: nothing but what means nothing there is replaced. As is_empty says, for every sample at once.
+    DepthMap map = map_of(raw, encoding, precision_of(raw, encoding));
     if (encoding.kind == EncodingKind::planar && encoding.scale == 1 && !encoding.empty) {
-        DepthMap map = map_of(raw, encoding, precision_of(raw, encoding));
-        const float end = is_integer(raw.type)              ? std::numeric_limits<float>::infinity()
-                          : raw.type == SampleType::float16 ? half_far_away
-                                                            : far_away;
-        for (float& stored : raw.samples) stored = stored > 0 && stored < end ? stored : nothing_there;
+        replace_empty(raw.samples, raw.type);
         map.depth = std::move(raw.samples);
         return map;
     }
 
-    DepthMap map = map_of(raw, encoding, precision_of(raw, encoding));
     map.depth.reserve(raw.samples.size());
-    std::size_t on_far_plane = 0;
+    const RadialStretch stretch{raw.width, raw.height, half_extent, center};
+    std::size_t beyond = 0, there = 0;
     for (std::size_t i = 0; i < raw.samples.size(); ++i) {
         const float stored = raw.samples[i];
         if (is_empty(stored, raw, encoding)) {
             map.depth.push_back(nothing_there);
             continue;
         }
-        const double value = in_unit_range(encoding.kind) && is_integer(raw.type) ? stored / largest_integer(raw.type) : stored;
+        ++there;
+        const double value = unit_value(stored, raw.type, encoding.kind);
         if (in_unit_range(encoding.kind) && (value < 0 || value > 1))
-            throw Error(ErrorCode::invalid_input, at + ": has a stored value of " + std::to_string(value),
-                        "expected 0 to 1 in this encoding");
-        on_far_plane += encoding.kind == EncodingKind::window && value == 1;
+            throw Error(ErrorCode::invalid_input, at + ": has a stored value of " + number(value), "expected 0 to 1 in this encoding");
         double depth = decode(value, encoding) * (encoding.shift ? 1 : encoding.scale);
-        if (encoding.kind == EncodingKind::radial) {
-            const double x = (2 * (static_cast<double>(i % static_cast<std::size_t>(raw.width)) + 0.5) / raw.width - 1) * half_extent.x;
-            const double y = (1 - 2 * (static_cast<double>(i / static_cast<std::size_t>(raw.width)) + 0.5) / raw.height) * half_extent.y;
-            depth /= std::sqrt(1 + x * x + y * y);
+        if (encoding.kind == EncodingKind::radial) depth /= stretch.at(i);
+        // What a scale and a shift put behind infinity is as far away as nothing.
+        if (encoding.shift && !(depth > 0 && std::isfinite(depth))) {
+            ++beyond;
+            depth = nothing_there;
         }
         if (!(depth > 0))
-            throw Error(ErrorCode::invalid_input,
-                        at + ": a stored value of " + std::to_string(stored) + " decodes to depth " + std::to_string(depth),
-                        "expected positive depths; check the encoding");
+            throw Error(ErrorCode::invalid_input, at + ": a stored value of " + number(stored) + " decodes to depth " + number(depth),
+                        stored < 0 ? "expected positive depths; camera-space z needs a negative scale" : "expected positive depths; check the encoding");
         // A disparity may stand for a depth beyond float32: as far away as nothing.
         map.depth.push_back(depth > std::numeric_limits<float>::max() ? nothing_there : static_cast<float>(depth));
     }
-    if (on_far_plane > 0)
-        warnings.push_back(at + ": " + std::to_string(on_far_plane) +
-                           " pixels are exactly 1, the far plane; if that means nothing there, set \"empty\": 1 in its encoding");
+    if (beyond > 0 && beyond == there)
+        throw Error(ErrorCode::invalid_input, at + ": every value x scale + shift is 0 or less: " + values_text(raw),
+                    "expected disparities, 1 / depth; check encoding.scale and encoding.shift");
+    if (beyond > 0)
+        warnings.push_back(at + ": value x scale + shift is 0 or less at " + std::to_string(beyond) + " of " + std::to_string(there) +
+                           " pixels, which count as nothing there");
     return map;
 }
 

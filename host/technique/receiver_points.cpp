@@ -28,6 +28,8 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
 
     view.pixel_x = static_cast<float>(camera.half_extent.x / width);
     view.pixel_y = static_cast<float>(camera.half_extent.y / height);
+    view.off_x = static_cast<float>(camera.off_axis.x);
+    view.off_y = static_cast<float>(camera.off_axis.y);
     view.per_light_x = static_cast<float>(1 / light_view.half_extent.x);
     view.per_light_y = static_cast<float>(1 / light_view.half_extent.y);
     view.camera_orthographic = camera.orthographic;

@@ -89,6 +89,7 @@ typedef struct {
 typedef struct {
     float image_from_camera[12];
     float pixel_x, pixel_y; // tangents of a pixel of the view; lengths where it is orthographic
+    float off_x, off_y;     // from the viewing axis to the image's middle, right and up; in the same measure
     int width, height, orthographic;
 } DepthSight;
 

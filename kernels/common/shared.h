@@ -27,6 +27,7 @@
 typedef struct {
     float light_from_camera[12];            // 3 rows of 4: rotation and translation from the camera's (x, y, depth) to light space
     float pixel_x, pixel_y;                 // half a pixel's width and height: tangents, or lengths of an orthographic camera
+    float off_x, off_y;                     // from the viewing axis to the image's middle, right and up; in the same measure
     float per_light_x, per_light_y;         // 1 over the light's own view's tangents, or over its half extents if orthographic
     int camera_orthographic, light_orthographic;
     int width, height;                      // of the receiver map

@@ -34,7 +34,7 @@ public:
     AnyFile() : MemoryResources(test::parts()) {}
     Bytes bytes(const std::string& name) const override
     {
-        return MemoryResources::bytes(name == "emission.exr" ? "light.exr" : "depth.exr");
+        return MemoryResources::bytes(name == "emission.exr" || name == "position.exr" ? "light.exr" : "depth.exr");
     }
     std::string path(const std::string&) const override { return std::string(PENUMBRA_FUZZ_CORPUS) + "/mesh_obj/cube.obj"; }
 };
@@ -57,7 +57,7 @@ Json smallest(const Form& form)
 {
     Json json = Json::object();
     for (const Key& key : form.keys)
-        if (key.required) json[std::string(key.name)] = example_of(key);
+        if (key.required || (!form.exactly_one.empty() && form.exactly_one.front() == key.name)) json[std::string(key.name)] = example_of(key);
     return json;
 }
 
@@ -84,7 +84,9 @@ std::vector<std::pair<std::string, std::string>> homes(const description::Object
         {"occluder_depth", {{"/occluders/depth", "occluders.depth"}}},
         {"receivers", {{"/receivers", "receivers"}}},
         {"camera", {{"/receivers/camera", "receivers.camera"}, {"/occluders/camera", "occluders.camera"}}},
+        {"intrinsics", {{"/receivers/camera/intrinsics", "receivers.camera.intrinsics"}}},
         {"encoding", {{"/receivers/encoding", "receivers.encoding"}, {"/occluders/encoding", "occluders.encoding"}}},
+        {"anchor", {{"/receivers/encoding/anchors/0", "receivers.encoding.anchors[0]"}}},
         {"output", {{"/output", "output"}}}};
     return all.at(object.name);
 }
@@ -101,6 +103,12 @@ std::vector<Place> places()
                     place.scene["lights"] = Json::array({place.scene["light"]});
                     place.scene.erase("light");
                 }
+                if (object->name == "intrinsics") {
+                    place.scene["receivers"]["camera"] = smallest(description::camera().forms[description::looking_camera_form]);
+                    place.scene["receivers"]["camera"].erase("vertical_fov_deg");
+                }
+                if (object->name == "anchor")
+                    place.scene["receivers"]["encoding"] = {{"kind", "disparity"}, {"anchors", {nullptr, {{"pixel", {1, 1}}, {"depth", 2}}}}};
                 if (!pointer.empty()) place.held() = smallest(form);
                 result.push_back(std::move(place));
             }
@@ -140,6 +148,12 @@ std::string made_of(const Scene& scene)
 // Keys that cannot stand beside what the smallest scene has.
 void make_room(Place& place, std::string_view key)
 {
+    for (const std::string_view other : place.form->exactly_one)
+        if (!place.path.empty() && other != key && std::ranges::find(place.form->exactly_one, key) != place.form->exactly_one.end())
+            place.held().erase(std::string(other));
+    // A light's camera sees no positions.
+    if (key == "position" && place.path == "receivers")
+        place.held()["camera"] = smallest(description::camera().forms[description::looking_camera_form]);
     if (!place.path.empty()) return;
     if (key == "lights") place.scene.erase("light");
     if (key == "light") place.scene.erase("lights");
@@ -191,6 +205,7 @@ TEST(SceneDescription, NeededKeysAreNeeded)
         for (const Key& key : place.form->keys) {
             if (!key.required || place.form->keys.front().name == "mesh" || key.name == "quad" || key.name == "depth") continue;
             if (key.name == "eye" || key.name == "world_from_camera") continue; // they decide the form
+            if (key.name == "kind" && place.path.ends_with("encoding")) continue; // planar without it
             Place without = place;
             without.held().erase(std::string(key.name));
             const Error error = error_of([&] { read(without.scene); });
@@ -307,13 +322,14 @@ TEST(SceneDescription, RangesEndWhereTheySay)
             Place with = place;
             if (place.form->name == "output" && key.name == "bits") with.held()["format"] = "tif";
             const std::string path = place.key_path(key.name);
+            make_room(with, key.name);
             // An encoding's near lies before its far, a light's weights are not all 0.
             if (key.name == "far") with.held()["near"] = 1e-301;
             if (key.name == "weight") with.scene["lights"].push_back({{"kind", "point"}, {"center", {0, 1, 0}}, {"name", "other"}});
             if (key.name == "weight")
                 with.scene["receivers"]["camera"] = smallest(description::camera().forms[description::looking_camera_form]);
             for (const Json& value : ends.inside) {
-                with.held()[std::string(key.name)] = value;
+                with.held()[std::string(key.name)] = key.name == "position" ? Json("position.exr") : value;
                 EXPECT_NO_THROW(read(with.scene)) << path << " " << value.dump().substr(0, 80);
             }
             for (const Json& value : ends.outside) {
@@ -337,9 +353,11 @@ TEST(SceneDescription, FilesStandWhereTheDescriptionSays)
                                             "lights[].occluders.depth.layers[]",
                                             "objects[].mesh",
                                             "objects[].depth",
+                                            "objects[].position",
                                             "occluders.depth.front",
                                             "occluders.depth.back",
                                             "occluders.depth.layers[]",
-                                            "receivers.depth"};
+                                            "receivers.depth",
+                                            "receivers.position"};
     EXPECT_EQ(description::file_places(), expected);
 }

@@ -7,7 +7,7 @@ namespace penumbra::test {
 namespace {
 
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
-const std::vector<float> unit_samples = {0.001f, 0.25f, 0.5f, 0.75f, 0.999f, 1.0f};
+const std::vector<float> unit_samples = {0.001f, 0.25f, 0.5f, 0.75f, 0.999f};
 
 DepthEncoding of(EncodingKind kind, std::optional<double> near = {}, std::optional<double> far = {}, double scale = 1,
                  std::optional<double> empty = {})
@@ -54,8 +54,7 @@ TEST(DecodeDepth, WindowAndReversedWindow)
         EXPECT_FLOAT_EQ(reversed.depth[i], static_cast<float>(1 / (1 / f + w * (1 / n - 1 / f)))) << w;
         EXPECT_FLOAT_EQ(infinite.depth[i], static_cast<float>(n / w)) << w;
     }
-    EXPECT_FLOAT_EQ(window.depth.back(), 100);
-    EXPECT_FLOAT_EQ(reversed.depth.back(), 0.1f);
+    EXPECT_FLOAT_EQ(decode(of(EncodingKind::reversed_window, n, f), {1}).depth[0], 0.1f);
 }
 
 TEST(DecodeDepth, NormalizedIsLinear)
@@ -137,11 +136,6 @@ TEST(DecodeDepth, Warnings)
     decode({}, {1}, SampleType::float16, &warnings);
     ASSERT_EQ(warnings.size(), 1u);
     EXPECT_TRUE(holds(warnings[0], "half-float")) << warnings[0];
-    // A far plane full of pixels usually means nothing there.
-    warnings.clear();
-    decode(of(EncodingKind::window, 1, 9), {1, 0.5f, 1}, SampleType::float32, &warnings);
-    ASSERT_EQ(warnings.size(), 1u);
-    EXPECT_TRUE(holds(warnings[0], "2") && holds(warnings[0], "\"empty\": 1")) << warnings[0];
 }
 
 TEST(DecodeDepth, RangesAreChecked)
@@ -159,12 +153,135 @@ TEST(DecodeDepth, RangesAreChecked)
     EXPECT_TRUE(holds(message(EncodingKind::window, 9, 1), "0 < near < far"));
     EXPECT_TRUE(holds(message(EncodingKind::window, 0, 1), "0 < near < far"));
     message(EncodingKind::normalized, -1, 1);
-    message(EncodingKind::normalized, 1, 1);
+    EXPECT_TRUE(holds(message(EncodingKind::normalized, 1, 1), "differ"));
     message(EncodingKind::window, std::nan(""), 1);
     message(EncodingKind::normalized, 1, HUGE_VAL);
     EXPECT_TRUE(holds(decode_error(of(EncodingKind::window, 1, 9), {1.5f}).what(), "1.5"));
-    for (const double scale : {0.0, -1.0, HUGE_VAL, std::nan("")})
+    for (const double scale : {0.0, HUGE_VAL, std::nan("")})
         EXPECT_TRUE(holds(decode_error(of(EncodingKind::planar, {}, {}, scale), {1}).message(), "scale"));
+}
+
+// What a cleared depth buffer holds, in every type; `empty` says otherwise.
+TEST(DecodeDepth, TheFarEndOfADepthBufferIsNothing)
+{
+    const DepthEncoding window = of(EncodingKind::window, 1, 9), reversed = of(EncodingKind::reversed_window, 1, 9);
+    EXPECT_EQ(decode(window, {1, 0.999f}).depth[0], nothing_there);
+    EXPECT_TRUE(std::isfinite(decode(window, {1, 0.999f}).depth[1]));
+    EXPECT_EQ(decode(window, {1, 0.5f}, SampleType::float16).depth[0], nothing_there);
+    const DepthMap bytes = decode(window, {255, 254}, SampleType::uint8);
+    EXPECT_TRUE(bytes.depth[0] == nothing_there && bytes.depth[1] < 9);
+    EXPECT_EQ(decode(window, {65535}, SampleType::uint16).depth[0], nothing_there);
+    EXPECT_EQ(decode(window, {4294967295.0f}, SampleType::uint32).depth[0], nothing_there);
+    EXPECT_EQ(decode(reversed, {0, 1}).depth, (std::vector<float>{nothing_there, 1}));
+    EXPECT_EQ(decode(of(EncodingKind::reversed_window, 1, {}), {0, 1}).depth, (std::vector<float>{nothing_there, 1}));
+    EXPECT_EQ(decode(of(EncodingKind::normalized, 1, 9), {1}).depth[0], 9) << "its end is a depth like others";
+    EXPECT_FLOAT_EQ(decode(of(EncodingKind::window, 1, 9, 1, 0.5), {1}).depth[0], 9);
+}
+
+TEST(DecodeDepth, WhiteMayBeNear)
+{
+    const DepthMap map = decode(of(EncodingKind::normalized, 10, 2), {65535, 1, 0}, SampleType::uint16);
+    EXPECT_FLOAT_EQ(map.depth[0], 2);
+    EXPECT_FLOAT_EQ(map.depth[1], static_cast<float>(10 - 8 / 65535.0));
+    EXPECT_EQ(map.depth[2], nothing_there);
+    EXPECT_NEAR(map.step.depth, 8 / 65535.0, 1e-12);
+}
+
+// Camera-space z is negative: a negative scale turns it round, and with it what counts as nothing.
+TEST(DecodeDepth, NegativeScaleTurnsDepthRound)
+{
+    EXPECT_EQ(decode(of(EncodingKind::planar, {}, {}, -1), {-2, -1e9f, 0, 3, -nothing_there}).depth,
+              (std::vector<float>{2, nothing_there, nothing_there, nothing_there, nothing_there}));
+    EXPECT_EQ(decode(of(EncodingKind::radial, {}, {}, -2), {-2}).depth[0], 4);
+    EXPECT_EQ(decode(of(EncodingKind::disparity, {}, {}, -1), {-0.5f, 0.5f}).depth, (std::vector<float>{2, nothing_there}));
+    EXPECT_EQ(decode(of(EncodingKind::planar, {}, {}, -1, 7), {-2, 7}).depth, (std::vector<float>{2, nothing_there}));
+}
+
+TEST(DecodeDepth, NegativeValuesAreNotPassedOver)
+{
+    const Error error = decode_error({}, {-3, -5, 0});
+    EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+    EXPECT_TRUE(holds(error.message(), "its values are negative: 3 values from -5 to 0, 2 negative, 1 zero")) << error.message();
+    EXPECT_TRUE(holds(error.hint(), "\"scale\": -1")) << error.hint();
+    EXPECT_TRUE(holds(decode_error(of(EncodingKind::planar, {}, {}, -1), {3, 5}).message(), "positive"));
+
+    // One marker is nobody's mistake; many values are.
+    std::vector<std::string> warnings;
+    decode({}, {1, -1, 2, -1}, SampleType::float32, &warnings);
+    EXPECT_TRUE(warnings.empty());
+    decode({}, {1, -1, 2, -1.5f}, SampleType::float32, &warnings);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(holds(warnings[0], "2 values are negative")) << warnings[0];
+    warnings.clear();
+    EXPECT_EQ(decode(of(EncodingKind::planar, {}, {}, 1, -1), {-1, -1}, SampleType::float32, &warnings).depth[0], nothing_there);
+    EXPECT_TRUE(warnings.empty()) << "empty says that they mean nothing there";
+}
+
+TEST(DecodeDepth, DisparityBehindInfinityIsNothing)
+{
+    DepthEncoding network = of(EncodingKind::disparity, {}, {}, 1);
+    network.shift = -0.25;
+    std::vector<std::string> warnings;
+    EXPECT_EQ(decode(network, {0.5f, 0.25f, 0.1f}, SampleType::float32, &warnings).depth, (std::vector<float>{4, nothing_there, nothing_there}));
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(holds(warnings[0], "2 of 3 pixels")) << warnings[0];
+    EXPECT_TRUE(holds(decode_error(network, {0.1f, 0.2f}).message(), "0 or less"));
+}
+
+// Least squares in disparity: exact for what lies on a line, the textbook's line for what does not.
+TEST(DecodeDepth, AnchorsSolveScaleAndShift)
+{
+    DepthEncoding encoding = of(EncodingKind::disparity);
+    encoding.anchors = {{0, 0, 1}, {2, 0, 4}, {3, 0, 8}};
+    std::vector<std::string> warnings;
+    // value = (1 / depth - 0.05) / 0.002
+    const std::vector<float> exact{475, 200, 100, 37.5f};
+    const DepthMap map = decode(encoding, exact, SampleType::float32, &warnings);
+    EXPECT_FLOAT_EQ(map.depth[0], 1);
+    EXPECT_NEAR(map.depth[1], 1 / (200 * 0.002 + 0.05), 1e-6);
+    EXPECT_NEAR(map.depth[3], 8, 1e-5);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(holds(warnings[0], "3 anchors give scale 0.002 and shift 0.05")) << warnings[0];
+
+    // (1, 1), (2, 1/2), (3, 1/2): slope -1/4, through the means (2, 2/3).
+    warnings.clear();
+    encoding.anchors = {{0, 0, 1}, {1, 0, 2}, {2, 0, 2}};
+    decode(encoding, {1, 2, 3}, SampleType::float32, &warnings);
+    ASSERT_GE(warnings.size(), 1u);
+    EXPECT_TRUE(holds(warnings[0], "scale -0.25 and shift 1.16667; they miss the anchors' disparities by up to 33 %")) << warnings[0];
+    EXPECT_TRUE(holds(warnings[0], "greater values are further")) << warnings[0];
+}
+
+TEST(DecodeDepth, AnchorsStandOnWhatTheImageShows)
+{
+    const auto complaint = [](std::vector<DepthAnchor> anchors) {
+        DepthEncoding encoding = of(EncodingKind::disparity);
+        encoding.anchors = std::move(anchors);
+        return std::string(decode_error(encoding, {1, 2, 0, 1}).what());
+    };
+    EXPECT_TRUE(holds(complaint({{0, 0, 1}, {4, 0, 2}}), "[4, 0], which lies beside the image"));
+    EXPECT_TRUE(holds(complaint({{0, 0, 1}, {-1, 0, 2}}), "beside the image"));
+    EXPECT_TRUE(holds(complaint({{0, 0, 1}, {2, 0, 2}}), "nothing at the pixel [2, 0]"));
+    EXPECT_TRUE(holds(complaint({{0, 0, 1}, {3, 0, 2}}), "same value"));
+    EXPECT_TRUE(holds(complaint({{0, 0, 2}, {1, 0, 2}}), "one depth"));
+}
+
+// 1 2      . . . .
+// 3 4  ->  . 1 2 .   where the frame is a pixel wider; and the other way round.
+TEST(DecodeDepth, FramesAreWhatTheCameraSaw)
+{
+    RawDepth raw{.width = 2, .height = 2, .samples = {1, 2, 3, 4}, .frame = {-1, -1, 4, 4}};
+    const RawDepth wide = framed(raw);
+    ASSERT_EQ(wide.samples.size(), 16u);
+    EXPECT_EQ(wide.samples[5], 1);
+    EXPECT_EQ(wide.samples[10], 4);
+    EXPECT_TRUE(std::isnan(wide.samples[0]) && std::isnan(wide.samples[15]));
+    raw.frame = {1, 0, 1, 2};
+    EXPECT_EQ(framed(raw).samples, (std::vector<float>{2, 4}));
+    raw.frame = {};
+    EXPECT_EQ(framed(raw).samples, raw.samples);
+    raw.frame = {5, 5, 2, 1};
+    EXPECT_EQ(framed(raw).samples.size(), 2u) << "nothing in common";
 }
 
 // The largest relative error that the stored samples leave: half a step of what was stored.

@@ -40,12 +40,14 @@ std::string writes(const std::string& type, const std::vector<std::string>& memb
 TEST(SharedStructs, ReceiverView)
 {
     const std::vector<std::string> members = {
-        "light_from_camera",  "pixel_x", "pixel_y", "per_light_x", "per_light_y", "camera_orthographic",
+        "light_from_camera",  "pixel_x", "pixel_y", "off_x", "off_y", "per_light_x", "per_light_y", "camera_orthographic",
         "light_orthographic", "width",   "height",  "stride",      "rows"};
     const std::vector<cl_int> host = {sizeof(ReceiverView),
                                       HERE(ReceiverView, light_from_camera),
                                       HERE(ReceiverView, pixel_x),
                                       HERE(ReceiverView, pixel_y),
+                                      HERE(ReceiverView, off_x),
+                                      HERE(ReceiverView, off_y),
                                       HERE(ReceiverView, per_light_x),
                                       HERE(ReceiverView, per_light_y),
                                       HERE(ReceiverView, camera_orthographic),
@@ -55,8 +57,8 @@ TEST(SharedStructs, ReceiverView)
                                       HERE(ReceiverView, stride),
                                       HERE(ReceiverView, rows)};
     EXPECT_EQ(on_device(writes("ReceiverView", members), host.size()), host);
-    // Every member is listed: 12 + 4 floats and 6 ints.
-    EXPECT_EQ(sizeof(ReceiverView), 22 * 4u);
+    // Every member is listed: 12 + 6 floats and 6 ints.
+    EXPECT_EQ(sizeof(ReceiverView), 24 * 4u);
 }
 
 TEST(SharedStructs, OccluderView)

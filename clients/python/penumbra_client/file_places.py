@@ -11,8 +11,10 @@ FILE_PLACES = (
     "lights[].occluders.depth.layers[]",
     "objects[].mesh",
     "objects[].depth",
+    "objects[].position",
     "occluders.depth.front",
     "occluders.depth.back",
     "occluders.depth.layers[]",
     "receivers.depth",
+    "receivers.position",
 )

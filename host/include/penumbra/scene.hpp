@@ -106,6 +106,7 @@ struct Camera {
     Frame frame;
     bool orthographic = false;
     Vec2 half_extent{1, 1}; // perspective: tangents of the half angles; orthographic: half the width and height in scene units
+    Vec2 off_axis{0, 0};    // from the viewing axis to the image's middle, right and up; in the same measure
 };
 
 // The light's own camera: at its centre, along its axis, image x along +u, image up along +v. What is left out is fitted to the
@@ -116,10 +117,18 @@ struct LightCamera {
     std::optional<Vec3> center;       // directional lights: where the image plane's centre is; depth counts from there
 };
 
-// Any other camera. `tan_half_fov.x` of 0: from y and the image's aspect ratio.
+// Focal lengths and principal point in pixels; (0, 0) is the image's top left corner, (0.5, 0.5) the first pixel's centre.
+struct Intrinsics {
+    double fx = 0, fy = 0, cx = 0, cy = 0;
+};
+
+// Any other camera. `tan_half_fov.x` of 0: from y, the image's aspect ratio and that of its pixels.
 struct PinholeCamera {
     Frame frame;
     Vec2 tan_half_fov{0, 0};
+    std::optional<Intrinsics> intrinsics = {}; // in place of tan_half_fov
+    Vec2 shift{0, 0};                          // of the image, right and up, in its widths and heights
+    double pixel_aspect = 1;                   // a pixel's width over its height
 };
 
 using CameraSpec = std::variant<LightCamera, PinholeCamera>;

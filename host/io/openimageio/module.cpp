@@ -37,6 +37,6 @@ void configure_openimageio()
 extern "C" PENUMBRA_API const penumbra::OpenImageIO* penumbra_openimageio()
 {
     using namespace penumbra;
-    static constexpr OpenImageIO functions{PENUMBRA_VERSION, decode_by_openimageio, decode_depth_by_openimageio, encode_by_openimageio};
+    static constexpr OpenImageIO functions{PENUMBRA_VERSION, decode_by_openimageio, decode_planes_by_openimageio, encode_by_openimageio};
     return &functions;
 }

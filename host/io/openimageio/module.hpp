@@ -8,8 +8,8 @@
 namespace penumbra {
 
 Image decode_by_openimageio(std::span<const std::byte> bytes, ImageFormat format, std::string_view where, std::uint64_t max_samples);
-RawDepth decode_depth_by_openimageio(std::span<const std::byte> bytes, ImageFormat format, std::string_view channel, std::string_view where,
-                                     std::uint64_t max_samples);
+RawPlanes decode_planes_by_openimageio(std::span<const std::byte> bytes, ImageFormat format, const PlaneRequest& request, std::string_view where,
+                                       std::uint64_t max_samples);
 std::vector<std::byte> encode_by_openimageio(const Image& image, ImageFormat format, int bits);
 
 // OpenImageIO's name for the reader and writer of a format.

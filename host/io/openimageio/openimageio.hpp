@@ -10,8 +10,9 @@
 
 #include <penumbra/image.hpp>
 
+#include "io/depth_channel.hpp"
 #include "io/image_format.hpp"
-#include "scene/depth.hpp"
+#include "io/raw_planes.hpp"
 
 namespace penumbra {
 
@@ -19,8 +20,8 @@ namespace penumbra {
 struct OpenImageIO {
     const char* version; // the library's: module and library share structs, so both must be of one build
     Image (*decode_image)(std::span<const std::byte> bytes, ImageFormat format, std::string_view where, std::uint64_t max_samples);
-    RawDepth (*decode_raw_depth)(std::span<const std::byte> bytes, ImageFormat format, std::string_view channel, std::string_view where,
-                                 std::uint64_t max_samples);
+    RawPlanes (*decode_planes)(std::span<const std::byte> bytes, ImageFormat format, const PlaneRequest& request, std::string_view where,
+                               std::uint64_t max_samples);
     // TIFF (8 and 16 bits are integers, 32 floats), or Radiance with three channels; samples that the format holds.
     std::vector<std::byte> (*encode)(const Image& image, ImageFormat format, int bits);
 };

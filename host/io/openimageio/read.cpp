@@ -3,10 +3,10 @@
 #include "io/openimageio/module.hpp"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <memory>
-#include <optional>
 #include <string>
-#include <type_traits>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -22,15 +22,6 @@ Error broken(std::string_view where, const std::string& what, std::string hint =
     return {ErrorCode::invalid_input, std::string(where) + " " + what, std::move(hint)};
 }
 
-// OpenImageIO's messages have several lines and name our stand-in for a file name.
-std::string one_line(std::string text)
-{
-    while (!text.empty() && (text.back() == '\n' || text.back() == '.')) text.pop_back();
-    std::ranges::replace_if(
-        text, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, ' ');
-    return text.substr(0, 200);
-}
-
 // An opened image. Closes before the bytes go.
 class Source {
 public:
@@ -42,7 +33,7 @@ public:
         input_ = OIIO::ImageInput::create(name);
         if (!input_)
             throw Error(ErrorCode::internal,
-                        std::string(where_) + " cannot be read: OpenImageIO lacks " + name + ": " + one_line(OIIO::geterror()));
+                        std::string(where_) + " cannot be read: OpenImageIO lacks " + name + ": " + plain_line(OIIO::geterror()));
 
         // Samples as they stand: no alpha multiplied in, no colour model turned into another.
         OIIO::ImageSpec wanted, found;
@@ -71,16 +62,46 @@ public:
         if (std::max(pixels, tile) > max_samples / static_cast<std::uint64_t>(s.nchannels))
             throw Error(ErrorCode::too_large, std::string(where_) + " is " + size_text() + " x " + std::to_string(s.nchannels) +
                                                   " samples; the limit is " + std::to_string(max_samples));
+        if (const int turned = s.get_int_attribute("Orientation", 1); turned != 1)
+            throw broken(where_, "is stored turned (orientation " + std::to_string(turned) + "), expected row 0 at the top",
+                         "turn its pixels first");
+        if (format_ == ImageFormat::tiff) check_tiff();
+    }
+
+    // Throws for an EXR that is cropped, or has pixels beyond its display window.
+    void check_whole() const
+    {
+        const OIIO::ImageSpec& s = spec();
         if (exr() && (s.x != s.full_x || s.y != s.full_y || s.width != s.full_width || s.height != s.full_height))
             throw broken(where_,
                          "has a data window of " + size_text() + " at " + std::to_string(s.x) + ", " + std::to_string(s.y) +
                              " in a display window of " + std::to_string(s.full_width) + " x " + std::to_string(s.full_height) + " at " +
                              std::to_string(s.full_x) + ", " + std::to_string(s.full_y),
                          "write it with both alike");
-        if (const int turned = s.get_int_attribute("Orientation", 1); turned != 1)
-            throw broken(where_, "is stored turned (orientation " + std::to_string(turned) + "), expected row 0 at the top",
-                         "turn its pixels first");
-        if (format_ == ImageFormat::tiff) check_tiff();
+    }
+
+    // The display window of an EXR in its samples' pixels.
+    ImageFrame frame(std::uint64_t max_samples) const
+    {
+        if (!exr()) return {};
+        const OIIO::ImageSpec& s = spec();
+        const std::int64_t x = std::int64_t{s.full_x} - s.x, y = std::int64_t{s.full_y} - s.y;
+        constexpr std::int64_t furthest = std::numeric_limits<int>::max();
+        const ImageFrame frame{static_cast<int>(std::clamp(x, -furthest, furthest)), static_cast<int>(std::clamp(y, -furthest, furthest)), s.full_width,
+                               s.full_height};
+        check_frame(frame, where_, max_samples);
+        return frame;
+    }
+
+    double pixel_aspect() const { return sound_aspect(static_cast<double>(spec().get_float_attribute("PixelAspectRatio", 1))); }
+
+    // The part that stands open.
+    ImagePart part() const
+    {
+        ImagePart part{.name = spec().get_string_attribute("oiio:subimagename"), .channels = spec().channelnames, .deep = spec().deep};
+        if (spec().alpha_channel >= 0 && spec().alpha_channel < spec().nchannels && spec().nchannels == 2 && !exr())
+            part.channels[static_cast<std::size_t>(spec().alpha_channel)] = "A";
+        return part;
     }
 
     // The sample type of a channel; throws for those that we do not take.
@@ -111,19 +132,12 @@ public:
         if (!done || input_->has_error()) throw broken(where_, "is truncated or broken: " + complaint());
     }
 
-    std::string channel_list() const
-    {
-        std::string list;
-        for (const std::string& channel : spec().channelnames) list += (list.empty() ? "" : ", ") + one_line(channel);
-        return list;
-    }
-
     std::string size_text() const { return std::to_string(spec().width) + " x " + std::to_string(spec().height); }
 
 private:
     std::string complaint() const
     {
-        const std::string text = one_line(input_->geterror());
+        const std::string text = plain_line(input_->geterror());
         return text.empty() ? "the decoder gives no reason" : text;
     }
 
@@ -146,64 +160,39 @@ private:
     std::unique_ptr<OIIO::ImageInput> input_;
 };
 
-// The depth channel by its name, in the order of the header's list.
-std::optional<int> named_channel(const OIIO::ImageSpec& spec, std::string_view channel)
+// More parts are not looked at: a file can claim any number of them.
+constexpr int most_parts = 1024;
+
+// What is chosen among: the parts of an EXR; of another file the first page, or all up to the one that is asked for.
+std::vector<ImagePart> parts_of(Source& source, const PartChoice& choice, std::string_view where)
 {
-    const auto find = [&](const auto& fits) -> std::optional<int> {
-        const auto found = std::ranges::find_if(spec.channelnames, fits);
-        if (found == spec.channelnames.end()) return {};
-        return static_cast<int>(found - spec.channelnames.begin());
-    };
-    if (!channel.empty()) return find([&](const std::string& name) { return name == channel; });
-    if (const auto z = find([](const std::string& name) { return name == "Z"; })) return z;
-    if (const auto z = find([](const std::string& name) { return name == "depth.Z"; })) return z;
-    if (const auto z = find([](const std::string& name) { return name.ends_with(".Depth.Z"); })) return z;
-    if (spec.z_channel >= 0 && spec.z_channel < spec.nchannels) return spec.z_channel;
-    return {};
+    std::vector<ImagePart> parts{source.part()};
+    const OIIO::ImageSpec first = source.spec();
+    const bool said = !std::holds_alternative<std::monostate>(choice);
+    // (Pages of a TIFF have no names to look for.)
+    const int last = source.exr() ? most_parts - 1 : std::get_if<int>(&choice) ? std::get<int>(choice) : said ? 0 : 1;
+    for (int number = 1; number <= last && number < most_parts && source.seek(number); ++number) parts.push_back(source.part());
+    if (source.exr() || said || parts.size() == 1) return parts;
+    // A second page of another size is a smaller copy of the first.
+    if (source.spec().width == first.width && source.spec().height == first.height)
+        throw broken(where, "has several pages of one size", "choose one with encoding.part, from 0");
+    parts.resize(1);
+    return parts;
 }
 
-// The only channel that is not alpha.
-std::optional<int> only_channel(const OIIO::ImageSpec& spec)
+// The same by a reader of its own: that of TIFF reads no page any more once it was asked for one that there is not.
+std::vector<ImagePart> parts_of(std::span<const std::byte> bytes, ImageFormat format, const PartChoice& choice, std::string_view where)
 {
-    std::optional<int> only;
-    for (int c = 0; c < spec.nchannels; ++c) {
-        if (c == spec.alpha_channel) continue;
-        if (only) return {};
-        only = c;
-    }
-    return only;
+    Source source(bytes, format, where);
+    return parts_of(source, choice, where);
 }
 
-struct Pick {
-    int part, channel;
-};
-
-Pick pick_depth(Source& source, std::string_view channel, std::string_view where)
+template <class Sample> void read_channel(Source& source, const PlanePick& pick, std::size_t at, OIIO::TypeDesc type, std::vector<float>& samples)
 {
-    std::string list;
-    std::optional<Pick> only;
-    for (int part = 0; source.seek(part); ++part) {
-        const OIIO::ImageSpec& spec = source.spec();
-        if (spec.deep) continue;
-        if (const auto named = named_channel(spec, channel)) return {part, *named};
-        if (const auto single = only_channel(spec); single && !only) only = Pick{part, *single};
-        list += (list.empty() ? "" : "; ") + source.channel_list();
-        if (!source.exr()) break; // the pages of a TIFF are separate images; the first one counts
-    }
-    if (list.empty()) throw broken(where, "is a deep image", "flatten it first");
-    if (!channel.empty()) throw broken(where, "has no channel \"" + std::string(channel) + "\"; it has " + list);
-    if (only) return *only;
-    throw broken(where, "has no channel that is depth for certain; it has " + list, "name one with encoding.channel");
-}
-
-template <class Sample> std::vector<float> as_floats(Source& source, const Pick& pick, std::size_t count, OIIO::TypeDesc type)
-{
-    std::vector<Sample> samples(count);
-    source.read(pick.part, pick.channel, pick.channel + 1, type, samples.data());
-    if constexpr (std::is_same_v<Sample, float>)
-        return samples;
-    else
-        return {samples.begin(), samples.end()};
+    const std::size_t channels = pick.channels.size();
+    std::vector<Sample> plane(samples.size() / channels);
+    source.read(pick.part, pick.channels[at], pick.channels[at] + 1, type, plane.data());
+    for (std::size_t i = 0; i < plane.size(); ++i) samples[i * channels + at] = static_cast<float>(plane[i]);
 }
 
 } // namespace
@@ -213,8 +202,9 @@ Image decode_by_openimageio(std::span<const std::byte> bytes, ImageFormat format
     Source source(bytes, format, where);
     if (source.spec().nchannels > 4)
         throw broken(where,
-                     "has " + std::to_string(source.spec().nchannels) + " channels (" + source.channel_list() + "), expected at most 4");
+                     "has " + std::to_string(source.spec().nchannels) + " channels (" + channel_list(std::array{source.part()}) + "), expected at most 4");
     source.check(max_samples);
+    source.check_whole();
     for (int c = 0; c < source.spec().nchannels; ++c) source.type(c);
 
     Image image{source.spec().width, source.spec().height, source.spec().nchannels, {}};
@@ -223,29 +213,36 @@ Image decode_by_openimageio(std::span<const std::byte> bytes, ImageFormat format
     return image;
 }
 
-RawDepth decode_depth_by_openimageio(std::span<const std::byte> bytes, ImageFormat format, std::string_view channel, std::string_view where,
-                                     std::uint64_t max_samples)
+RawPlanes decode_planes_by_openimageio(std::span<const std::byte> bytes, ImageFormat format, const PlaneRequest& request, std::string_view where,
+                                       std::uint64_t max_samples)
 {
+    const PlanePick pick = pick_planes(parts_of(bytes, format, request.part, where), request, where);
     Source source(bytes, format, where);
-    const Pick pick = pick_depth(source, channel, where);
     if (!source.seek(pick.part)) throw broken(where, "is truncated or broken");
     source.check(max_samples);
 
-    RawDepth raw{source.spec().width, source.spec().height, source.type(pick.channel), {}};
-    const std::size_t count = static_cast<std::size_t>(raw.width) * static_cast<std::size_t>(raw.height);
-    switch (raw.type) {
-    case SampleType::uint8:
-        raw.samples = as_floats<std::uint8_t>(source, pick, count, OIIO::TypeUInt8);
-        break;
-    case SampleType::uint16:
-        raw.samples = as_floats<std::uint16_t>(source, pick, count, OIIO::TypeUInt16);
-        break;
-    case SampleType::uint32:
-        raw.samples = as_floats<std::uint32_t>(source, pick, count, OIIO::TypeUInt32);
-        break;
-    default:
-        raw.samples = as_floats<float>(source, pick, count, OIIO::TypeFloat);
-        break;
+    RawPlanes raw{.width = source.spec().width,
+                  .height = source.spec().height,
+                  .channels = static_cast<int>(pick.channels.size()),
+                  .type = source.type(pick.channels.front()),
+                  .frame = source.frame(max_samples),
+                  .pixel_aspect = source.pixel_aspect()};
+    raw.samples.resize(static_cast<std::size_t>(raw.width) * static_cast<std::size_t>(raw.height) * pick.channels.size());
+    for (std::size_t i = 0; i < pick.channels.size(); ++i) {
+        switch (raw.type) {
+        case SampleType::uint8:
+            read_channel<std::uint8_t>(source, pick, i, OIIO::TypeUInt8, raw.samples);
+            break;
+        case SampleType::uint16:
+            read_channel<std::uint16_t>(source, pick, i, OIIO::TypeUInt16, raw.samples);
+            break;
+        case SampleType::uint32:
+            read_channel<std::uint32_t>(source, pick, i, OIIO::TypeUInt32, raw.samples);
+            break;
+        default:
+            read_channel<float>(source, pick, i, OIIO::TypeFloat, raw.samples);
+            break;
+        }
     }
     return raw;
 }

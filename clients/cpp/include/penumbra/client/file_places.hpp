@@ -7,7 +7,7 @@
 namespace penumbra::client::detail {
 
 // Where a scene names files; [] is each element of a list.
-inline constexpr std::array<std::string_view, 13> file_places{
+inline constexpr std::array<std::string_view, 15> file_places{
     "light.emission",
     "light.emission[]",
     "lights[].emission",
@@ -17,10 +17,12 @@ inline constexpr std::array<std::string_view, 13> file_places{
     "lights[].occluders.depth.layers[]",
     "objects[].mesh",
     "objects[].depth",
+    "objects[].position",
     "occluders.depth.front",
     "occluders.depth.back",
     "occluders.depth.layers[]",
     "receivers.depth",
+    "receivers.position",
 };
 
 } // namespace penumbra::client::detail
