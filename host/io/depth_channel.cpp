@@ -49,7 +49,8 @@ bool ends_in_word(std::string_view layer, std::span<const std::string_view> word
     return std::ranges::any_of(words, [&](std::string_view word) {
         if (!name.ends_with(word)) return false;
         const std::size_t before = name.size() - word.size();
-        return before == 0 || word.size() >= telling || (word.size() > 1 && std::isalnum(static_cast<unsigned char>(name[before - 1])) == 0);
+        return before == 0 || word.size() >= telling ||
+               (word.size() > 1 && std::isalnum(static_cast<unsigned char>(name[before - 1])) == 0);
     });
 }
 
@@ -108,7 +109,8 @@ void add_depth(const ImagePart& part, int number, bool several, std::vector<Plan
         for (std::size_t i = 0; i < part.channels.size(); ++i) {
             const ChannelName name = split(part.channels[i]);
             if (name.layer != layer) continue;
-            const bool whole = layer.empty() ? is_bare_depth(part, name.component, several) : name.component.size() > 1 && means_depth(name.component);
+            const bool whole =
+                layer.empty() ? is_bare_depth(part, name.component, several) : name.component.size() > 1 && means_depth(name.component);
             if (whole) found.push_back({number, {static_cast<int>(i)}});
         }
     }
@@ -121,7 +123,8 @@ std::vector<int> triple_of(const ImagePart& part, const std::string& layer)
         std::vector<int> triple;
         for (const char component : components)
             for (std::size_t i = 0; i < part.channels.size(); ++i)
-                if (const ChannelName name = split(part.channels[i]); name.layer == layer && lower(name.component) == std::string(1, component))
+                if (const ChannelName name = split(part.channels[i]);
+                    name.layer == layer && lower(name.component) == std::string(1, component))
                     triple.push_back(static_cast<int>(i));
         if (triple.size() == 3) return triple;
     }
@@ -189,7 +192,8 @@ std::vector<int> chosen_parts(std::span<const ImagePart> parts, const PartChoice
     std::vector<int> numbers;
     bool any_deep = false;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-        const bool fits = std::holds_alternative<std::monostate>(choice) || (std::get_if<int>(&choice) && std::get<int>(choice) == static_cast<int>(i)) ||
+        const bool fits = std::holds_alternative<std::monostate>(choice) ||
+                          (std::get_if<int>(&choice) && std::get<int>(choice) == static_cast<int>(i)) ||
                           (std::get_if<std::string>(&choice) && std::get<std::string>(choice) == parts[i].name);
         if (!fits) continue;
         any_deep |= parts[i].deep;
@@ -200,15 +204,18 @@ std::vector<int> chosen_parts(std::span<const ImagePart> parts, const PartChoice
     return numbers;
 }
 
-[[noreturn]] void not_certain(std::span<const ImagePart> parts, const PlaneRequest& request, std::span<const PlanePick> found, std::string_view where)
+[[noreturn]] void not_certain(std::span<const ImagePart> parts, const PlaneRequest& request, std::span<const PlanePick> found,
+                              std::string_view where)
 {
     const bool depth = request.planes == Planes::depth;
     const std::string list = channel_list(parts);
     if (found.empty() && !request.channel.empty())
-        throw broken(where, std::string("has no ") + (depth ? "channel" : "layer of three channels") + " \"" + plain_line(request.channel) + "\"; it has " + list);
+        throw broken(where, std::string("has no ") + (depth ? "channel" : "layer of three channels") + " \"" + plain_line(request.channel) +
+                                "\"; it has " + list);
     if (found.empty())
         throw broken(where, std::string("has no channel that is ") + (depth ? "depth" : "a position") + " for certain; it has " + list,
-                     parts.size() > 1 ? "name one with encoding.channel, and its part with encoding.part" : "name one with encoding.channel");
+                     parts.size() > 1 ? "name one with encoding.channel, and its part with encoding.part"
+                                      : "name one with encoding.channel");
     std::string several;
     bool other_parts = false;
     for (const PlanePick& pick : found) {

@@ -1,4 +1,5 @@
-// Lights, objects, output, and the scene itself; cameras and depth images are in scene_description_views.cpp.
+// Lights, objects, output, and the scene itself; cameras and depth images are in scene_description_views.cpp, encodings in
+// scene_description_encoding.cpp.
 #include "io/scene_description.hpp"
 
 #include <array>

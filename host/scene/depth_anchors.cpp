@@ -47,20 +47,22 @@ DepthEncoding solved(const DepthEncoding& encoding, const RawDepth& raw, const s
         product += (values[i] - mean) * (1 / encoding.anchors[i].depth - mean_disparity);
     }
     if (!(square > 0))
-        throw Error(ErrorCode::invalid_input, where + ": stores the same value at every pixel of encoding.anchors", "expected pixels of different depths");
+        throw Error(ErrorCode::invalid_input, where + ": stores the same value at every pixel of encoding.anchors",
+                    "expected pixels of different depths");
     DepthEncoding result = encoding;
     result.scale = product / square;
     result.shift = mean_disparity - result.scale * mean;
     if (result.scale == 0 || !std::isfinite(result.scale) || !std::isfinite(*result.shift))
-        throw Error(ErrorCode::invalid_input, where + ": encoding.anchors give one depth for every value", "expected pixels of different depths");
+        throw Error(ErrorCode::invalid_input, where + ": encoding.anchors give one depth for every value",
+                    "expected pixels of different depths");
 
     // How far the line is from the anchors, as a depth.
     double worst = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
         worst = std::max(worst, std::abs(encoding.anchors[i].depth * (values[i] * result.scale + *result.shift) - 1));
     char numbers[160];
-    std::snprintf(numbers, sizeof numbers, "scale %.6g and shift %.6g; they miss the anchors' disparities by up to %.2g %%", result.scale, *result.shift,
-                  100 * worst);
+    std::snprintf(numbers, sizeof numbers, "scale %.6g and shift %.6g; they miss the anchors' disparities by up to %.2g %%", result.scale,
+                  *result.shift, 100 * worst);
     warnings.push_back(where + ": " + std::to_string(values.size()) + " anchors give " + numbers +
                        (result.scale < 0 ? "; the scale is negative, so greater values are further: is this disparity?" : ""));
     return result;

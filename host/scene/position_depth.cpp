@@ -17,9 +17,11 @@ void check(const PositionImage& positions, const DepthEncoding& encoding, const 
     if (encoding.kind != EncodingKind::planar)
         throw Error(ErrorCode::invalid_input, where + " holds positions, and the encoding's kind is one of depth",
                     "expected an encoding without kind; scale, empty, channel and part count");
-    if (is_integer(positions.type)) throw Error(ErrorCode::invalid_input, where + " holds integers; positions need floats", "use EXR float32");
+    if (is_integer(positions.type))
+        throw Error(ErrorCode::invalid_input, where + " holds integers; positions need floats", "use EXR float32");
     if (positions.type == SampleType::float16)
-        warnings.push_back(where + " is half-float: positions are right to 1 part in 2048 of their distance to the origin; float32 is better");
+        warnings.push_back(where +
+                           " is half-float: positions are right to 1 part in 2048 of their distance to the origin; float32 is better");
 }
 
 // How far apart neighbouring stored numbers of this size are.
@@ -27,7 +29,7 @@ double step_at(double size, SampleType type) { return size * (type == SampleType
 
 struct Seen {
     std::size_t there = 0, behind = 0, elsewhere = 0;
-    double largest = 0;  // coordinate
+    double largest = 0;        // coordinate
     double nearest = HUGE_VAL; // depth
 };
 
@@ -38,7 +40,8 @@ void warn(const Seen& seen, const std::string& where, std::vector<std::string>& 
                            " positions lie behind the camera and count as nothing there");
     if (2 * seen.elsewhere <= seen.there) return;
     warnings.push_back(where + ": the camera sees " + std::to_string(seen.elsewhere) + " of " + std::to_string(seen.there) +
-                       " positions more than 2 pixels beside their own pixel; the camera or encoding.scale is another, or the positions are not the world's");
+                       " positions more than 2 pixels beside their own pixel; the camera or encoding.scale is another, or the positions "
+                       "are not the world's");
 }
 
 } // namespace
@@ -47,7 +50,8 @@ DepthMap depth_of_positions(const PositionImage& positions, const DepthEncoding&
                             std::vector<std::string>& warnings)
 {
     check(positions, encoding, where, warnings);
-    DepthMap map{.width = positions.width, .height = positions.height, .depth = {}, .from_image = true, .noise = encoding.precision.value_or(0)};
+    DepthMap map{
+        .width = positions.width, .height = positions.height, .depth = {}, .from_image = true, .noise = encoding.precision.value_or(0)};
     const auto empty = static_cast<float>(encoding.empty.value_or(0));
     const std::size_t count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
     map.depth.assign(count, nothing_there);
@@ -65,7 +69,8 @@ DepthMap depth_of_positions(const PositionImage& positions, const DepthEncoding&
             ++seen.behind;
             continue;
         }
-        const double x = static_cast<double>(i % static_cast<std::size_t>(map.width)) + 0.5, y = static_cast<double>(i / static_cast<std::size_t>(map.width)) + 0.5;
+        const double x = static_cast<double>(i % static_cast<std::size_t>(map.width)) + 0.5,
+                     y = static_cast<double>(i / static_cast<std::size_t>(map.width)) + 0.5;
         seen.elsewhere += !(std::max(std::abs(at.x_px - x), std::abs(at.y_px - y)) <= 2);
         seen.largest = std::max({seen.largest, std::abs(world.x), std::abs(world.y), std::abs(world.z)});
         seen.nearest = std::min(seen.nearest, at.depth);

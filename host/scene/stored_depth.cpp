@@ -12,16 +12,19 @@ RawDepth framed(RawDepth raw)
 {
     const ImageFrame frame = frame_of(raw);
     if (frame.x == 0 && frame.y == 0 && frame.width == raw.width && frame.height == raw.height) return raw;
-    RawDepth result{.width = frame.width, .height = frame.height, .type = raw.type, .samples = {}, .frame = {}, .pixel_aspect = raw.pixel_aspect};
+    RawDepth result{
+        .width = frame.width, .height = frame.height, .type = raw.type, .samples = {}, .frame = {}, .pixel_aspect = raw.pixel_aspect};
     const auto width = static_cast<std::size_t>(frame.width);
     result.samples.assign(width * static_cast<std::size_t>(frame.height), std::numeric_limits<float>::quiet_NaN());
 
     // Rows and columns that both have.
     const int first = std::max(frame.x, 0), end = static_cast<int>(std::min<std::int64_t>(std::int64_t{frame.x} + frame.width, raw.width));
-    const int top = std::max(frame.y, 0), bottom = static_cast<int>(std::min<std::int64_t>(std::int64_t{frame.y} + frame.height, raw.height));
+    const int top = std::max(frame.y, 0),
+              bottom = static_cast<int>(std::min<std::int64_t>(std::int64_t{frame.y} + frame.height, raw.height));
     for (int y = top; y < bottom && first < end; ++y) {
         const float* const row = raw.samples.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(raw.width);
-        std::copy(row + first, row + end, &result.samples[static_cast<std::size_t>(y - frame.y) * width + static_cast<std::size_t>(first - frame.x)]);
+        std::copy(row + first, row + end,
+                  &result.samples[static_cast<std::size_t>(y - frame.y) * width + static_cast<std::size_t>(first - frame.x)]);
     }
     return result;
 }
@@ -54,7 +57,8 @@ std::string values_text(const RawDepth& raw)
     char range[80];
     std::snprintf(range, sizeof range, " from %.6g to %.6g", static_cast<double>(least), static_cast<double>(greatest));
     if (least <= greatest) text += range;
-    return text + ", " + std::to_string(negative) + " negative, " + std::to_string(zero) + " zero, " + std::to_string(infinite) + " infinite or no number";
+    return text + ", " + std::to_string(negative) + " negative, " + std::to_string(zero) + " zero, " + std::to_string(infinite) +
+           " infinite or no number";
 }
 
 } // namespace penumbra

@@ -29,8 +29,8 @@ inline double unit_value(float stored, SampleType type, EncodingKind kind)
     return in_unit_range(kind) && is_integer(type) ? std::min(stored / largest_integer(type), 1.0) : stored;
 }
 
-// Whether negative numbers are what stands for depth: camera-space z, which a negative scale turns round. With a shift, or in a range of 0 to
-// 1, the scale says nothing about what is stored.
+// Whether negative numbers are what stands for depth: camera-space z, which a negative scale turns round. With a shift, or in a range of 0
+// to 1, the scale says nothing about what is stored.
 inline bool is_flipped(const DepthEncoding& encoding)
 {
     return encoding.scale < 0 && !encoding.shift && encoding.anchors.empty() && !in_unit_range(encoding.kind);

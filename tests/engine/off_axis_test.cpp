@@ -108,7 +108,8 @@ TEST(OffAxis, MasksOfMeshesAreThePart)
 {
     for (const TechniqueRow& row : technique_table()) {
         SCOPED_TRACE(row.kind);
-        const std::vector<float> part = mask_of(part_scene(), std::string(row.kind)), whole = part_of(mask_of(whole_scene(), std::string(row.kind)));
+        const std::vector<float> part = mask_of(part_scene(), std::string(row.kind)),
+                                 whole = part_of(mask_of(whole_scene(), std::string(row.kind)));
         EXPECT_LT(mean(whole), .97) << "there is a shadow to compare";
         EXPECT_LT(mean_difference(part, whole), .002);
     }

@@ -36,15 +36,17 @@ void expect_says(const std::string& text, std::initializer_list<const char*> wor
 
 TEST(DepthChannel, IsFoundByNamesThatMeanDepth)
 {
-    for (const char* name : {"Z", "z", "depth", "Depth", "ZDepth", "depth.Z", "Depth.Z", "Depth.V", "depth.Y", "ViewLayer.Depth.Z", "View Layer.depth.Z", "ZDepth.R",
-                             "VRayZDepth.R", "FinalImageMovieRenderQueue_WorldDepth.R", "rgba.depth", "Z.Z"})
+    for (const char* name :
+         {"Z", "z", "depth", "Depth", "ZDepth", "depth.Z", "Depth.Z", "Depth.V", "depth.Y", "ViewLayer.Depth.Z", "View Layer.depth.Z",
+          "ZDepth.R", "VRayZDepth.R", "FinalImageMovieRenderQueue_WorldDepth.R", "rgba.depth", "Z.Z"})
         EXPECT_EQ(picked({"R", "G", "B", "A", name, "N.X", "N.Y", "N.Z"}), std::string("0/") + name);
     EXPECT_EQ(picked({"ZDepth.R", "ZDepth.G", "ZDepth.B", "ZDepth.A", "R"}), "0/ZDepth.R") << "a layer of depth holds one";
 }
 
 TEST(DepthChannel, OtherZsAreNone)
 {
-    for (const char* name : {"Normal.Z", "N.Z", "P.Z", "Position.Z", "Vector.Z", "ViewLayer.Mist.Z", "UV.Z", "normal_z", "Pz", "DepthOfField.Z", "Depth.A"})
+    for (const char* name :
+         {"Normal.Z", "N.Z", "P.Z", "Position.Z", "Vector.Z", "ViewLayer.Mist.Z", "UV.Z", "normal_z", "Pz", "DepthOfField.Z", "Depth.A"})
         expect_says(picked({"R", "G", "B", name}), {"no channel that is depth for certain", "R, G, B", name, "encoding.channel"});
     expect_says(picked({"X", "Y", "Z"}), {"no channel that is depth for certain", "X, Y, Z"});
 }
@@ -55,7 +57,8 @@ TEST(DepthChannel, TheOnlyOneIsDepth)
     EXPECT_EQ(picked({"distance", "A"}), "0/distance");
     EXPECT_EQ(picked({"Normal.Z"}), "0/Normal.Z");
     // Not the first single one of several parts.
-    expect_says(picked(Parts{{"mist", {"Y"}}, {"shadow", {"Y"}}}), {"no channel that is depth", "part 0 \"mist\": Y; part 1 \"shadow\": Y", "encoding.part"});
+    expect_says(picked(Parts{{"mist", {"Y"}}, {"shadow", {"Y"}}}),
+                {"no channel that is depth", "part 0 \"mist\": Y; part 1 \"shadow\": Y", "encoding.part"});
     EXPECT_EQ(picked(Parts{{"preview", {"A"}}, {"other", {"Y"}}}), "1/Y");
 }
 
@@ -63,7 +66,8 @@ TEST(DepthChannel, TwoAreAnErrorThatListsThem)
 {
     expect_says(picked({"Z", "depth.Z", "R"}), {"more than one depth: Z, depth.Z", "it has Z, depth.Z, R", "encoding.channel"});
     expect_says(picked({"a.Depth.Z", "b.Depth.Z"}), {"more than one depth: a.Depth.Z, b.Depth.Z"});
-    expect_says(picked(Parts{{"left", {"depth.Z"}}, {"right", {"depth.Z"}}}), {"depth.Z in part 0 \"left\"", "depth.Z in part 1 \"right\"", "encoding.part"});
+    expect_says(picked(Parts{{"left", {"depth.Z"}}, {"right", {"depth.Z"}}}),
+                {"depth.Z in part 0 \"left\"", "depth.Z in part 1 \"right\"", "encoding.part"});
     // However many there are, the line stays readable.
     Names many{"a.depth.Z", "b.depth.Z"};
     for (int i = 0; i < 1000; ++i) many.push_back("layer" + std::to_string(i) + ".R");
@@ -96,7 +100,8 @@ TEST(DepthChannel, PositionsAreThree)
               "0/ViewLayer.Position.X ViewLayer.Position.Y ViewLayer.Position.Z");
     EXPECT_EQ(picked(Parts{{"", {"R", "G", "B", "A"}}}, position), "0/R G B");
     EXPECT_EQ(picked(Parts{{"beauty", {"R", "G", "B"}}, {"WorldPosition", {"R", "G", "B"}}}, position), "1/R G B");
-    EXPECT_EQ(picked(Parts{{"", {"N.X", "N.Y", "N.Z", "my.R", "my.G", "my.B"}}}, {.planes = Planes::position, .channel = "my"}), "0/my.R my.G my.B");
+    EXPECT_EQ(picked(Parts{{"", {"N.X", "N.Y", "N.Z", "my.R", "my.G", "my.B"}}}, {.planes = Planes::position, .channel = "my"}),
+              "0/my.R my.G my.B");
     expect_says(picked(Parts{{"", {"R", "G", "B", "N.X", "N.Y", "N.Z"}}}, position), {"no channel that is a position"});
     expect_says(picked(Parts{{"", {"Z"}}}, position), {"no channel that is a position"});
 }
@@ -104,7 +109,9 @@ TEST(DepthChannel, PositionsAreThree)
 TEST(DepthChannel, PartsOfFiles)
 {
     const std::vector<float> one(6, 1), two(6, 2), three(6, 3);
-    const MadeImage exr{.width = 3, .height = 2, .parts = {{"beauty", {{"R", one}, {"G", one}, {"B", one}}}, {"second", {{"R", two}, {"G", two}, {"B", three}}}}};
+    const MadeImage exr{.width = 3,
+                        .height = 2,
+                        .parts = {{"beauty", {{"R", one}, {"G", one}, {"B", one}}}, {"second", {{"R", two}, {"G", two}, {"B", three}}}}};
     const std::vector<std::byte> bytes = bytes_of(exr);
     EXPECT_EQ(decode_raw_depth(bytes, "R", "x", max_image_samples, 1).samples, two);
     EXPECT_EQ(decode_raw_depth(bytes, "B", "x", max_image_samples, "second").samples, three);

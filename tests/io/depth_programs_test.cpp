@@ -70,7 +70,8 @@ void expect_truth(std::vector<std::byte> bytes, const std::string& line, double 
         text << file.rdbuf();
         EXPECT_NE(text.str().find("`" + line + "`"), std::string::npos) << "docs/depth.md has no such line";
     }
-    const Scene scene = read_with(std::move(bytes), "\"" + key + "\": \"file\"" + (line.starts_with("\"encoding\"") ? ", " + line : ""), camera);
+    const Scene scene =
+        read_with(std::move(bytes), "\"" + key + "\": \"file\"" + (line.starts_with("\"encoding\"") ? ", " + line : ""), camera);
     ASSERT_TRUE(scene.receivers.depth);
     const DepthMap& map = *scene.receivers.depth;
     ASSERT_EQ(map.width, width);
@@ -116,8 +117,9 @@ TEST(DepthPrograms, Blender)
 // A camera shift of .1: the image lies to the right of the axis by a tenth of its width.
 TEST(DepthPrograms, BlenderShift)
 {
-    const Scene scene = read_with(bytes_of(exr({{"ViewLayer.Depth.Z", plain(1e10)}})), "\"depth\": \"file\"",
-                                  R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "vertical_fov_deg": 40, "shift": [0.1, 0]})");
+    const Scene scene =
+        read_with(bytes_of(exr({{"ViewLayer.Depth.Z", plain(1e10)}})), "\"depth\": \"file\"",
+                  R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "vertical_fov_deg": 40, "shift": [0.1, 0]})");
     EXPECT_EQ(std::get<PinholeCamera>(scene.receivers.camera).shift, Vec2(.1, 0));
 }
 
@@ -136,14 +138,17 @@ TEST(DepthPrograms, PositionPasses)
                                                          {"ViewLayer.Normal.Y", other},
                                                          {"ViewLayer.Normal.Z", other}}));
     expect_truth(blender, "\"position\": \"P.exr\"", 1e-6, "position");
-    const std::vector<std::byte> arnold = bytes_of(exr({{"P.R", axis(0)}, {"P.G", axis(1)}, {"P.B", axis(2)}, {"R", other}, {"G", other}, {"B", other}}));
+    const std::vector<std::byte> arnold =
+        bytes_of(exr({{"P.R", axis(0)}, {"P.G", axis(1)}, {"P.B", axis(2)}, {"R", other}, {"G", other}, {"B", other}}));
     expect_truth(arnold, "\"position\": \"P.exr\"", 1e-6, "position");
     EXPECT_TRUE(read_with(arnold, "\"position\": \"file\"").warnings.empty());
     // A camera elsewhere does not see them where they are.
-    const Scene wrong = read_with(arnold, "\"position\": \"file\"", R"({"kind": "pinhole", "eye": [3, 0, 0], "target": [3, 0, -1], "vertical_fov_deg": 40})");
+    const Scene wrong = read_with(arnold, "\"position\": \"file\"",
+                                  R"({"kind": "pinhole", "eye": [3, 0, 0], "target": [3, 0, -1], "vertical_fov_deg": 40})");
     ASSERT_EQ(wrong.warnings.size(), 1u);
     EXPECT_NE(wrong.warnings[0].find("beside their own pixel"), std::string::npos) << wrong.warnings[0];
-    const Scene behind = read_with(arnold, "\"position\": \"file\"", R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, 1], "vertical_fov_deg": 40})");
+    const Scene behind = read_with(arnold, "\"position\": \"file\"",
+                                   R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, 1], "vertical_fov_deg": 40})");
     ASSERT_EQ(behind.warnings.size(), 2u);
     EXPECT_NE(behind.warnings[0].find("47 of 47 positions lie behind the camera"), std::string::npos) << behind.warnings[0];
 }
@@ -152,8 +157,10 @@ TEST(DepthPrograms, PositionPasses)
 TEST(DepthPrograms, Arnold)
 {
     const Samples other = same(.5f);
-    expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"A", other}, {"Z", plain(0)}, {"N.X", other}, {"N.Y", other}, {"N.Z", other}})),
-                 "nothing", 1e-6);
+    expect_truth(
+        bytes_of(
+            exr({{"R", other}, {"G", other}, {"B", other}, {"A", other}, {"Z", plain(0)}, {"N.X", other}, {"N.Y", other}, {"N.Z", other}})),
+        "nothing", 1e-6);
     MadeImage cropped{.width = width - 1, .height = height - 1, .parts = {{"", {{"Z", {}}}, [](OIIO::ImageSpec& spec) {
                                                                                spec.x = spec.y = 1;
                                                                                spec.full_x = spec.full_y = 0;
@@ -174,7 +181,12 @@ TEST(DepthPrograms, VRay)
     const Samples inverted = stored([](double z, std::size_t) { return (6 - z) / 5; }, 0);
     const std::string line = R"("encoding": { "kind": "normalized", "near": 6, "far": 1 })";
     const Samples other = same(.25f);
-    expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"VRayZDepth.R", inverted}, {"VRayZDepth.G", inverted}, {"VRayZDepth.B", inverted}})),
+    expect_truth(bytes_of(exr({{"R", other},
+                               {"G", other},
+                               {"B", other},
+                               {"VRayZDepth.R", inverted},
+                               {"VRayZDepth.G", inverted},
+                               {"VRayZDepth.B", inverted}})),
                  line, 1e-5);
     // Parts that all call their channels R, G, B.
     const MadeImage parts{.width = width,
@@ -196,9 +208,11 @@ TEST(DepthPrograms, VRay)
 TEST(DepthPrograms, Karma)
 {
     const Samples other = same(.5f), z = plain(0), negative = stored([](double depth, std::size_t) { return -depth; }, 0);
-    expect_truth(bytes_of(exr({{"C.R", other}, {"C.G", other}, {"C.B", other}, {"depth", z}, {"N.z", other}, {"P.z", other}})), "nothing", 1e-6);
+    expect_truth(bytes_of(exr({{"C.R", other}, {"C.G", other}, {"C.B", other}, {"depth", z}, {"N.z", other}, {"P.z", other}})), "nothing",
+                 1e-6);
     expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"hitPz", z}})), R"("encoding": { "channel": "hitPz" })", 1e-6);
-    expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"hitPz", negative}})), R"("encoding": { "channel": "hitPz", "scale": -1 })", 1e-6);
+    expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"hitPz", negative}})),
+                 R"("encoding": { "channel": "hitPz", "scale": -1 })", 1e-6);
 }
 
 // Centimetres in half floats, which end at 65504 in the sky.
@@ -206,7 +220,14 @@ TEST(DepthPrograms, Unreal)
 {
     const Samples depth = stored([](double z, std::size_t) { return z * 100; }, 65504), other = same(.5f);
     const std::string layer = "FinalImageMovieRenderQueue_WorldDepth";
-    expect_truth(bytes_of(exr({{"R", other}, {"G", other}, {"B", other}, {"A", other}, {layer + ".R", depth}, {layer + ".G", other}, {layer + ".B", other}, {layer + ".A", other}},
+    expect_truth(bytes_of(exr({{"R", other},
+                               {"G", other},
+                               {"B", other},
+                               {"A", other},
+                               {layer + ".R", depth},
+                               {layer + ".G", other},
+                               {layer + ".B", other},
+                               {layer + ".A", other}},
                               OIIO::TypeHalf)),
                  R"("encoding": { "scale": 0.01 })", 0x1p-11);
 }
@@ -227,7 +248,8 @@ TEST(DepthPrograms, Three)
 {
     const double n = 1, f = 10;
     const auto w = [&](double z) { return (1 / n - 1 / z) / (1 / n - 1 / f); };
-    expect_truth(pfm_of(stored([&](double z, std::size_t) { return w(z); }, 1)), R"("encoding": { "kind": "window", "near": 1, "far": 10 })", 1e-5);
+    expect_truth(pfm_of(stored([&](double z, std::size_t) { return w(z); }, 1)),
+                 R"("encoding": { "kind": "window", "near": 1, "far": 10 })", 1e-5);
     // MeshDepthMaterial: 1 - w as a grey picture of 8 bits.
     const Samples grey = stored([&](double z, std::size_t) { return std::round((1 - w(z)) * 255); }, 0);
     MadeImage png = exr({{"R", grey}, {"G", grey}, {"B", grey}, {"A", same(255)}}, OIIO::TypeUInt8);
@@ -256,7 +278,8 @@ TEST(DepthPrograms, Networks)
     const std::string line =
         R"("encoding": { "kind": "disparity", "anchors": [{ "pixel": [0, 0], "depth": 2 }, { "pixel": [7, 0], "depth": 4.1 }, { "pixel": [0, 5], "depth": 2.85 }] })";
     expect_truth(pfm_of(stored(network(.0013, .02), -1)), line, 1e-5);
-    MadeImage png = exr({{"Y", stored([&](double z, std::size_t i) { return std::round(network(1e-5, .02)(z, i)); }, 0)}}, OIIO::TypeUInt16);
+    MadeImage png =
+        exr({{"Y", stored([&](double z, std::size_t i) { return std::round(network(1e-5, .02)(z, i)); }, 0)}}, OIIO::TypeUInt16);
     png.plugin = "png";
     expect_truth(bytes_of(png), line, 1e-3);
     expect_truth(pfm_of(stored(network(.0013, .02), -1)), R"("encoding": { "kind": "disparity", "scale": 0.0013, "shift": 0.02 })", 1e-5);

@@ -47,7 +47,10 @@ SeenSurface object_of(std::vector<std::byte> bytes, const std::string& camera = 
 }
 
 // Where the data's pixel (column, row) shows, seen through the whole frame: the direction, at depth 1.
-Vec3 direction(const SeenSurface& seen, double column, double row) { return camera_point(seen.camera, seen.depth.width, seen.depth.height, column, row, 1); }
+Vec3 direction(const SeenSurface& seen, double column, double row)
+{
+    return camera_point(seen.camera, seen.depth.width, seen.depth.height, column, row, 1);
+}
 
 } // namespace
 
@@ -119,9 +122,9 @@ TEST(DepthWindow, PixelAspectCountsWithTheVerticalAngle)
         EXPECT_NEAR(seen.camera.half_extent.y, 1, 1e-12);
     }
     // Angles that are given for both ways stay.
-    const SeenSurface given =
-        object_of(windowed(0, 0, 4, 3, false, 0, 0, 2),
-                  R"({"kind": "pinhole", "world_from_camera": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "tan_half_fov": [0.5, 0.4]})");
+    const SeenSurface given = object_of(
+        windowed(0, 0, 4, 3, false, 0, 0, 2),
+        R"({"kind": "pinhole", "world_from_camera": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "tan_half_fov": [0.5, 0.4]})");
     EXPECT_EQ(given.camera.half_extent, Vec2(.5, .4));
 }
 
@@ -139,8 +142,9 @@ TEST(DepthWindow, APictureMustBeWhole)
 // x / z = (column - cx) / fx, y / z = (cy - row) / fy.
 TEST(Lens, IntrinsicsAreTheProjection)
 {
-    const SeenSurface seen = object_of(windowed(0, 0, 4, 3, false),
-                                       R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "intrinsics": {"fx": 5, "fy": 4, "cx": 1.5, "cy": 2.25}})");
+    const SeenSurface seen = object_of(
+        windowed(0, 0, 4, 3, false),
+        R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "intrinsics": {"fx": 5, "fy": 4, "cx": 1.5, "cy": 2.25}})");
     for (const double x : {0., .5, 3.})
         for (const double y : {0., 1.5, 3.}) {
             EXPECT_NEAR(direction(seen, x, y).x, (x - 1.5) / 5, 1e-12);
@@ -155,8 +159,9 @@ TEST(Lens, IntrinsicsAreTheProjection)
 // A quarter of the width to the right: the axis meets the image a quarter of its width left of the middle.
 TEST(Lens, ShiftMovesTheImage)
 {
-    const SeenSurface seen = object_of(windowed(0, 0, 4, 3, false),
-                                       R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "vertical_fov_deg": 90, "shift": [0.25, -0.5]})");
+    const SeenSurface seen =
+        object_of(windowed(0, 0, 4, 3, false),
+                  R"({"kind": "pinhole", "eye": [0, 0, 0], "target": [0, 0, -1], "vertical_fov_deg": 90, "shift": [0.25, -0.5]})");
     EXPECT_NEAR(direction(seen, 1, 0).x, 0, 1e-12);
     EXPECT_NEAR(direction(seen, 1, 0).y, 0, 1e-12);
     EXPECT_NEAR(direction(seen, 4, 3).x, 2, 1e-12);
@@ -165,14 +170,16 @@ TEST(Lens, ShiftMovesTheImage)
 
 TEST(Lens, WrittenScenesReadBackAlike)
 {
-    const std::string camera = R"({"kind": "pinhole", "eye": [1, 2, 3], "target": [0, 0, 0], "intrinsics": {"fx": 5, "fy": 4, "cx": 1.5, "cy": 2.25}, "shift": [0.1, 0]})";
+    const std::string camera =
+        R"({"kind": "pinhole", "eye": [1, 2, 3], "target": [0, 0, 0], "intrinsics": {"fx": 5, "fy": 4, "cx": 1.5, "cy": 2.25}, "shift": [0.1, 0]})";
     const Scene scene = receivers_of(windowed(0, 0, 4, 3, false), camera);
     MemoryResources resources;
     resources.parts["file"] = windowed(0, 0, 4, 3, false);
     DepthNames names;
     names.receiver = "file";
     const Scene again = parse_scene(write_scene(scene, names), resources);
-    const Camera one = pinhole_view(std::get<PinholeCamera>(scene.receivers.camera), 4, 3), other = pinhole_view(std::get<PinholeCamera>(again.receivers.camera), 4, 3);
+    const Camera one = pinhole_view(std::get<PinholeCamera>(scene.receivers.camera), 4, 3),
+                 other = pinhole_view(std::get<PinholeCamera>(again.receivers.camera), 4, 3);
     EXPECT_LT((one.half_extent - other.half_extent).length() + (one.off_axis - other.off_axis).length(), 1e-12);
 }
 
@@ -183,10 +190,14 @@ TEST(DepthValues, AnImageWithoutDepthIsDescribed)
         EXPECT_EQ(scene.warnings.size(), 1u);
         return scene.warnings.empty() ? std::string() : scene.warnings[0];
     };
-    EXPECT_EQ(warning({0, INFINITY, 1e10f, 0}, ""), "receivers.depth: file shows no surface: 4 values from 0 to 1e+10, 0 negative, 2 zero, 1 infinite or no number");
+    EXPECT_EQ(warning({0, INFINITY, 1e10f, 0}, ""),
+              "receivers.depth: file shows no surface: 4 values from 0 to 1e+10, 0 negative, 2 zero, 1 infinite or no number");
     EXPECT_EQ(warning({1, 1, 1, 1}, R"(, "encoding": {"kind": "window", "near": 1, "far": 2})"),
               "receivers.depth: file shows no surface: 4 values from 1 to 1, 0 negative, 0 zero, 0 infinite or no number");
-    EXPECT_MENTIONS(error_of([] { receivers_of(bytes_of(MadeImage{.width = 2, .height = 2, .parts = {{"", {{"Z", {-1, -2, -3, 0}}}}}})); }), "negative");
+    EXPECT_MENTIONS(error_of([] {
+                        receivers_of(bytes_of(MadeImage{.width = 2, .height = 2, .parts = {{"", {{"Z", {-1, -2, -3, 0}}}}}}));
+                    }),
+                    "negative");
 }
 
 TEST(DepthValues, PfmHeadersMayEndInCarriageReturns)

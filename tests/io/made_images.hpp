@@ -49,7 +49,8 @@ inline std::vector<std::byte> bytes_of(const MadeImage& image)
     std::vector<OIIO::ImageSpec> specs;
     for (const MadePart& part : image.parts) specs.push_back(spec_of(image, part));
     const bool several = specs.size() > 1 && image.plugin == "openexr";
-    EXPECT_TRUE(several ? output->open(path, static_cast<int>(specs.size()), specs.data()) : output->open(path, specs[0])) << output->geterror();
+    EXPECT_TRUE(several ? output->open(path, static_cast<int>(specs.size()), specs.data()) : output->open(path, specs[0]))
+        << output->geterror();
     for (std::size_t i = 0; i < specs.size(); ++i) {
         EXPECT_TRUE(i == 0 || output->open(path, specs[i], OIIO::ImageOutput::AppendSubimage)) << output->geterror();
         const std::vector<float> pixels = pixels_of(image.parts[i]);
