@@ -7,6 +7,7 @@
 #include <CL/opencl.hpp>
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -50,6 +51,9 @@ public:
 
     // Tests turn this on: every buffer gets a guard tail, checked when the buffer is read or dropped.
     bool canaries = false;
+
+    // Something was launched that the driver may have compiled while nobody waited for it (driver_cache.hpp).
+    mutable std::atomic<bool> unrecorded = false;
 
 private:
     Context(cl::Context context, cl::Device device, DeviceInfo info);

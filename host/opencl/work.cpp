@@ -1,8 +1,10 @@
 #include "opencl/work.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 
+#include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/ledger.hpp"
 
@@ -201,6 +203,16 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
         // it.
         const bool first = own_queue_ && context_->first_launch(kernel, name, local);
         if (first) queue_.finish();
+        const Quirks& quirks = context_->quirks();
+        std::optional<RecordingIfSlow> recording;
+        if (quirks.driver_cache && (first || !own_queue_)) {
+            driver_cache().require_room();
+            if (quirks.system_linker && linker().empty()) driver_cache().require_library(name, whole, local);
+            if (first)
+                recording.emplace();
+            else
+                context_->unrecorded = true;
+        }
         const Clock::time_point start = Clock::now();
         queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(whole[0], whole[1]), cl::NDRange(local[0], local[1]), nullptr,
                                     new_event());
