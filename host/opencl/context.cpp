@@ -67,6 +67,13 @@ Context::~Context()
     }
 }
 
+std::shared_ptr<const Context> LateContext::get() const
+{
+    const std::lock_guard lock(opening_);
+    if (!context_) context_ = Context::open(selector_);
+    return context_;
+}
+
 cl::CommandQueue Context::queue() const
 {
     return translated("device " + info_.name, [&] { return cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE); });

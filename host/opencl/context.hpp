@@ -12,6 +12,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <penumbra/engine.hpp>
 
@@ -65,6 +66,21 @@ private:
     std::shared_ptr<Ledger> ledger_;
     mutable std::mutex launched_mutex_;
     mutable std::set<std::string> launched_;
+};
+
+// A device that is opened when something first needs it. Safe from several threads.
+class LateContext {
+public:
+    explicit LateContext(std::string selector) : selector_(std::move(selector)) {}
+    explicit LateContext(std::shared_ptr<const Context> context) : context_(std::move(context)) {}
+
+    // Throws what Context::open throws; the next call tries again.
+    std::shared_ptr<const Context> get() const;
+
+private:
+    std::string selector_;
+    mutable std::mutex opening_;
+    mutable std::shared_ptr<const Context> context_;
 };
 
 } // namespace penumbra::opencl

@@ -45,7 +45,7 @@ Prepared choose_folder()
     }
     const auto instead = [&] {
         for (const std::string& problem : problems)
-            chosen.warnings.push_back("no kernels are kept: " + problem + "; they are built in " + chosen.folder.path + " instead");
+            chosen.warnings.push_back("compiled kernels go to " + chosen.folder.path + ": " + problem);
         return chosen;
     };
 
@@ -98,12 +98,14 @@ void prepare_environment() { prepared(); }
 const std::vector<std::string>& environment_warnings() { return prepared().warnings; }
 const DriverFolder& driver_folder() { return prepared().folder; }
 
+bool is_pocl(std::string_view platform) { return platform.find("Portable Computing Language") != std::string_view::npos; }
+
 Quirks quirks_of(const cl::Device& device)
 {
     Quirks quirks;
     if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) quirks.lanes = 16;
     const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
-    quirks.driver_cache = platform.getInfo<CL_PLATFORM_NAME>().find("Portable Computing Language") != std::string::npos;
+    quirks.driver_cache = is_pocl(platform.getInfo<CL_PLATFORM_NAME>());
     quirks.keep_binaries = !quirks.driver_cache;
     quirks.system_linker = quirks.driver_cache && platform.getInfo<CL_PLATFORM_VERSION>().find("+debian") != std::string::npos;
     return quirks;

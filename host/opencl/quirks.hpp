@@ -7,6 +7,7 @@
 #include <CL/opencl.hpp>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace penumbra::opencl {
@@ -41,6 +42,9 @@ void prepare_environment();
 // What prepare_environment has to say: which folder cannot be used, why, and which one is used instead. It is called first where it was not.
 const std::vector<std::string>& environment_warnings();
 const DriverFolder& driver_folder();
+
+// By the platform's name.
+bool is_pocl(std::string_view platform);
 
 Quirks quirks_of(const cl::Device& device);
 
