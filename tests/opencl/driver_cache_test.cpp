@@ -97,6 +97,7 @@ TEST_F(DriverCacheFolder, DamageIsThrownAwayAProgramAtATime)
         {"foreign", [](const fs::path& file) { put(file, std::string(20000, 'g')); }},
         {"gone", [](const fs::path& file) { fs::remove(file); }},
         {"a folder", [](const fs::path& file) { fs::remove(file); put(file / "x", "x"); }},
+        {"an empty folder", [](const fs::path& file) { fs::remove(file); fs::create_directory(file); }},
         {"a link", [](const fs::path& file) { fs::remove(file); fs::create_symlink("/dev/zero", file); }},
     };
     for (const auto& [name, damage] : damages) {
@@ -139,6 +140,13 @@ TEST_F(DriverCacheFolder, ADamagedListKnowsNothing)
         DriverCache(folder_.path(), true);
         EXPECT_FALSE(has(hash_a) || has(hash_b));
     }
+    recorded();
+    for (const std::string& name : {std::string(".penumbra-kernels"), bitcode(hash_a), hash_b + "/last_accessed"}) {
+        fs::remove_all(path(name));
+        fs::create_directory(path(name));
+    }
+    DriverCache(folder_.path(), true);
+    EXPECT_FALSE(has(hash_a) || has(hash_b));
     recorded();
     for (const char* name : {".penumbra-kernels", ".penumbra-lock"}) {
         fs::remove_all(path(name));
