@@ -8,12 +8,10 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string_view>
 
 #include <dirent.h>
-#include <elf.h>
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -33,8 +31,6 @@ namespace fs = std::filesystem;
 
 constexpr const char *list_name = "/.penumbra-kernels", *lock_name = "/.penumbra-lock";
 
-std::int64_t nanoseconds(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
-
 // The letters of PoCL's hashes.
 bool is_hash(std::string_view name, std::size_t length)
 {
@@ -49,54 +45,6 @@ std::string boot_id()
     return id.empty() ? "unknown" : id;
 }
 
-std::optional<std::string> content_of(const std::string& path)
-{
-    const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-    if (file < 0) return std::nullopt;
-    struct stat status = {};
-    std::optional<std::string> bytes;
-    if (fstat(file, &status) == 0 && S_ISREG(status.st_mode)) {
-        bytes.emplace(static_cast<std::size_t>(status.st_size), '\0');
-        if (read(file, bytes->data(), bytes->size()) != static_cast<ssize_t>(bytes->size())) bytes.reset();
-    }
-    close(file);
-    return bytes;
-}
-
-// 64 bits, eight bytes a step. Each step is one to one in the hash and in the word: files that differ in one word alone never meet.
-std::uint64_t hash_of(std::string_view bytes)
-{
-    std::uint64_t hash = 0x9e3779b97f4a7c15 ^ bytes.size();
-    const auto step = [&hash](std::uint64_t word) {
-        hash = (hash ^ word) * 0xff51afd7ed558ccd; // odd
-        hash ^= hash >> 32;
-    };
-    for (; bytes.size() >= 8; bytes.remove_prefix(8)) {
-        std::uint64_t word = 0;
-        std::memcpy(&word, bytes.data(), 8);
-        step(word);
-    }
-    std::uint64_t rest = 0;
-    std::memcpy(&rest, bytes.data(), bytes.size());
-    step(rest);
-    return hash;
-}
-
-// Whether a file of which nothing is known looks like what its name says, and whole: LLVM's bitcode, or a library up to its last section.
-bool looks_sound(const std::string& path)
-{
-    const auto bytes = content_of(path);
-    if (!bytes) return false;
-    if (path.ends_with(".bc")) return bytes->size() > 4 && bytes->size() % 4 == 0 && bytes->starts_with("BC\xC0\xDE");
-    if (!path.ends_with(".so")) return true;
-    Elf64_Ehdr header = {};
-    if (bytes->size() < sizeof header) return false;
-    std::memcpy(&header, bytes->data(), sizeof header);
-    // The table of sections is a linker's last.
-    return std::memcmp(header.e_ident, ELFMAG, SELFMAG) == 0 && header.e_ident[EI_CLASS] == ELFCLASS64 && header.e_shoff > 0 &&
-           header.e_shoff <= bytes->size() && bytes->size() - header.e_shoff >= std::uint64_t{header.e_shnum} * header.e_shentsize;
-}
-
 // "PJ/EKPP..." of a path below it.
 std::string program_of(const std::string& path)
 {
@@ -104,17 +52,17 @@ std::string program_of(const std::string& path)
     return first == std::string::npos ? path : path.substr(0, path.find('/', first + 1));
 }
 
+// Whether it is such a path: what is thrown away is never outside the folder, whatever a damaged list says.
+bool is_in_program(const std::string& path)
+{
+    const std::string program = program_of(path);
+    return program.size() == 41 && program.size() < path.size() && is_hash(program.substr(0, 2), 2) && is_hash(program.substr(3), 38);
+}
+
 // Files that PoCL writes again at any time, and never loads.
 bool is_scratch(const std::string& path)
 {
     return path.ends_with("/last_accessed") || path.ends_with("/build.log") || path.find(".temp") != std::string::npos;
-}
-
-std::string line_of(const std::string& path, const CachedFile& file)
-{
-    std::ostringstream line;
-    line << std::hex << file.hash << std::dec << ' ' << file.bytes << ' ' << file.modified_ns << ' ' << file.changed_ns << ' ' << path;
-    return line.str();
 }
 
 // Waits for nobody who might not let go: what another process holds alone, it holds while it checks.
@@ -172,8 +120,9 @@ template <class Take> void walk_below(int folder, const std::string& prefix, int
 std::vector<DriverCache::Found> DriverCache::walk() const
 {
     std::vector<Found> all;
-    walk_below(open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC), "", 0,
-               [&](const std::string& path, const struct stat& status) { all.push_back({path, status}); });
+    walk_below(open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC), "", 0, [&](const std::string& path, const struct stat& status) {
+        all.push_back({path, status});
+    });
     return all;
 }
 
@@ -203,22 +152,18 @@ DriverCache::~DriverCache()
     if (lock_ >= 0) close(lock_);
 }
 
-// Lines: "boot ID", "HASH BYTES MODIFIED CHANGED PATH", "- PROGRAM" (thrown away). The last word on a path counts. A line that makes no sense
-// is left out: what it was about is then unknown, and built again.
+// Lines: "boot ID", "HASH BYTES MODIFIED CHANGED PATH", "- PROGRAM" (thrown away). The last word on a path counts. A line that makes no
+// sense is left out: what it was about is then unknown, and built again.
 void DriverCache::read_list()
 {
     std::istringstream text(content_of(folder_ + list_name).value_or(""));
     for (std::string line; std::getline(text, line); ++lines_) {
-        std::istringstream words(line);
-        CachedFile file;
-        std::string path;
         if (line.starts_with("boot ")) {
             boot_ = line.substr(5);
         } else if (line.starts_with("- ")) {
             std::erase_if(list_, [program = line.substr(2)](const auto& known) { return program_of(known.first) == program; });
-        } else if (words >> std::hex >> file.hash >> std::dec >> file.bytes >> file.modified_ns >> file.changed_ns >> path &&
-                   is_hash(std::string_view(path).substr(0, path.find('/')), 2)) {
-            list_[path] = file;
+        } else if (const auto file = file_of_line(line); file && is_in_program(file->first)) {
+            list_.insert_or_assign(file->first, file->second);
         }
     }
 }
@@ -256,8 +201,8 @@ void DriverCache::check(bool strict)
         if (!sound) damaged.insert(program_of(found.path));
     }
 
-    // A library that is gone is built again; a program whose file is gone, or a folder in a file's place, PoCL does not get over. Others may
-    // have thrown it away.
+    // A library that is gone is built again; a program whose file is gone, or a folder in a file's place, PoCL does not get over. Others
+    // may have thrown it away.
     for (const auto& [path, file] : list_) {
         struct stat status = {};
         if (!seen.contains(path) && (strict || lstat((folder_ + '/' + path).c_str(), &status) == 0)) damaged.insert(program_of(path));
@@ -281,7 +226,8 @@ void DriverCache::check(bool strict)
     std::error_code ignored;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder_, ignored)) {
         const std::string name = entry.path().filename().string();
-        if (name.starts_with("tempfile_") || name.starts_with("tempdir_") || name.starts_with(".penumbra-new-")) fs::remove_all(entry.path(), ignored);
+        if (name.starts_with("tempfile_") || name.starts_with("tempdir_") || name.starts_with(".penumbra-new-"))
+            fs::remove_all(entry.path(), ignored);
     }
 }
 
@@ -342,7 +288,7 @@ void DriverCache::record()
         if (!found.regular() || is_scratch(found.path) || list_.contains(found.path)) continue;
         const auto bytes = content_of(folder_ + '/' + found.path);
         if (!bytes) continue;
-        const CachedFile file{hash_of(*bytes), bytes->size(), nanoseconds(found.status.st_mtim), nanoseconds(found.status.st_ctim)};
+        const CachedFile file = cached_file(*bytes, found.status);
         list_[found.path] = file;
         news.push_back(line_of(found.path, file));
     }
@@ -365,7 +311,9 @@ void DriverCache::require_library(const std::string& kernel, const std::array<st
     if (global[0] < small && global[1] < small) shape += "-smallgrid";
     if (has_library(kernel, shape)) return;
     const char* path = std::getenv("PATH");
-    throw Error(ErrorCode::device, std::string("the linker ld is not on PATH (") + (path ? path : "not set") + "), and PoCL needs it to build the kernel " + kernel,
+    throw Error(ErrorCode::device,
+                std::string("the linker ld is not on PATH (") + (path ? path : "not set") + "), and PoCL needs it to build the kernel " +
+                    kernel,
                 "expected ld of the package binutils, in /usr/bin as a rule");
 }
 
@@ -376,7 +324,8 @@ bool DriverCache::has_library(const std::string& kernel, const std::string& shap
     const std::vector<Found> all = walk();
     std::set<std::string> programs;
     for (const Found& found : all)
-        if (found.path.ends_with("/last_accessed") && nanoseconds(found.status.st_mtim) >= opened_ns_ - clock_tick_ns) programs.insert(program_of(found.path));
+        if (found.path.ends_with("/last_accessed") && nanoseconds(found.status.st_mtim) >= opened_ns_ - clock_tick_ns)
+            programs.insert(program_of(found.path));
     return std::ranges::any_of(all, [&](const Found& found) {
         const std::string program = program_of(found.path);
         return programs.contains(program) && found.path == program + '/' + kernel + '/' + shape + '/' + kernel + ".so";
@@ -405,23 +354,6 @@ RecordingIfSlow::~RecordingIfSlow()
     } catch (const std::exception&) {
         // What is not recorded is built again.
     }
-}
-
-const std::string& linker()
-{
-    static const std::string found = [] {
-        std::vector<std::string> folders{"/usr/lib/llvm-15/bin"}; // of Debian's PoCL 3.1
-        const char* variable = std::getenv("PATH");
-        std::istringstream path(variable ? variable : "");
-        for (std::string folder; std::getline(path, folder, ':');) folders.push_back(folder.empty() ? "." : folder);
-        for (const std::string& folder : folders) {
-            std::string file = folder + "/ld";
-            struct stat status = {};
-            if (stat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode) && access(file.c_str(), R_OK | X_OK) == 0) return file;
-        }
-        return std::string();
-    }();
-    return found;
 }
 
 } // namespace penumbra::opencl

@@ -1,14 +1,14 @@
 // The folder in which PoCL keeps compiled kernels, kept sound. PoCL takes what lies there without a look: a shortened library kills the
 // process (SIGBUS), an emptied program fails for ever.
 //
-// Beside PoCL's files stands a list of them, `.penumbra-kernels`, written when they are: size, times and a hash of each. What does not fit it
-// when a process starts is thrown away, a whole program at a time, and PoCL builds it anew. The times are enough while the machine runs;
+// Beside PoCL's files stands a list of them, `.penumbra-kernels`, written when they are: size, times and a hash of each. What does not fit
+// it when a process starts is thrown away, a whole program at a time, and PoCL builds it anew. The times are enough while the machine runs;
 // after a restart, which may have lost what was not yet on the disk, everything is read again.
 //
 // Layout of PoCL 3.1, [A-P] being the letters of a hash in base 16:
 //     <folder>/[A-P]{2}/[A-P]{38}/program.bc, last_accessed, build.log
 //                                /<kernel>/<local size>-goffs0[-smallgrid]/<kernel>.so
-//     <folder>/tempfile_*         what is being made; renamed when it is whole
+//     <folder>/tempfile_*           what is being made; renamed when it is whole
 #pragma once
 
 #include <array>
@@ -21,13 +21,9 @@
 #include <string>
 #include <vector>
 
-namespace penumbra::opencl {
+#include "opencl/cached_file.hpp"
 
-// What is known of a file in the list.
-struct CachedFile {
-    std::uint64_t hash = 0, bytes = 0;
-    std::int64_t modified_ns = 0, changed_ns = 0; // as stat says, since 1970
-};
+namespace penumbra::opencl {
 
 // Safe from several threads, and with several processes in one folder.
 class DriverCache {
@@ -48,7 +44,8 @@ public:
     void require_room() const;
     // Throws Error(device) unless the kernel is there for such work-groups (`global` in work-items), of a program that was built since the
     // process began: to be asked where there is no linker, for PoCL would end the process.
-    void require_library(const std::string& kernel, const std::array<std::size_t, 2>& global, const std::array<std::size_t, 2>& local) const;
+    void require_library(const std::string& kernel, const std::array<std::size_t, 2>& global,
+                         const std::array<std::size_t, 2>& local) const;
 
     // How many programs were thrown away.
     int thrown_away() const { return thrown_away_; }
@@ -74,7 +71,8 @@ private:
     std::mutex mutex_;
 };
 
-// The one of this process, in the folder that prepare_environment chose; checked at the first call, which goes before the first OpenCL call.
+// The one of this process, in the folder that prepare_environment chose; checked at the first call, which goes before the first OpenCL
+// call.
 DriverCache& driver_cache();
 
 // Around a first launch: if it took as long as compiling takes, the driver has written something, which is recorded at the end.
@@ -88,8 +86,5 @@ public:
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-// The program that PoCL links kernels with, looked for where it does: in the compiler's own folder, then on PATH. Empty: there is none.
-const std::string& linker();
 
 } // namespace penumbra::opencl

@@ -38,9 +38,10 @@ Prepared choose_folder()
         problems.push_back(path + origin + ' ' + std::move(why));
         return false;
     };
+    // Not `pocl`, where builds before this check keep theirs without a lock.
     if (const char* given = std::getenv("POCL_CACHE_DIR"); given && *given) {
         if (usable(given, false, " (POCL_CACHE_DIR)")) return chosen;
-    } else if (const std::string folder = cache_folder(); !folder.empty() && usable(folder + "/pocl", true, "")) {
+    } else if (const std::string folder = cache_folder(); !folder.empty() && usable(folder + "/kernels", true, "")) {
         return chosen;
     }
     const auto instead = [&] {
@@ -53,11 +54,11 @@ Prepared choose_folder()
     const char* variable = std::getenv("TMPDIR");
     const std::string temporary = variable && *variable ? variable : "/tmp";
     const std::vector<std::string> asked = problems;
-    if (usable(temporary + "/penumbra-" + std::to_string(geteuid()), true, "")) return instead();
+    if (usable(temporary + "/penumbra-kernels-" + std::to_string(geteuid()), true, "")) return instead();
 
     // One for this process alone. It stays behind: PoCL uses it until the process's very end, after anything that could remove it.
     const std::vector<std::string> named = problems;
-    if (std::string folder = temporary + "/penumbra-XXXXXX"; mkdtemp(folder.data())) {
+    if (std::string folder = temporary + "/penumbra-kernels-XXXXXX"; mkdtemp(folder.data())) {
         if (usable(folder, true, "")) {
             problems = asked;
             return instead();

@@ -7,6 +7,7 @@
 #include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/ledger.hpp"
+#include "opencl/linker.hpp"
 
 namespace penumbra::opencl {
 namespace {

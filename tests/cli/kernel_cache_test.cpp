@@ -59,7 +59,9 @@ TEST_F(KernelCache, HealsWhateverHappenedToItsFiles)
             fs::resize_file(file, 0);
             fs::resize_file(file, size);
         },
-        [](const fs::path& file) { if (file.extension() == ".so") fs::resize_file(file, 5000); },
+        [](const fs::path& file) {
+            if (file.extension() == ".so") fs::resize_file(file, 5000);
+        },
         [](const fs::path& file) { std::ofstream(file) << std::string(20000, 'g'); },
         [](const fs::path& file) {
             fs::remove(file);
@@ -95,7 +97,8 @@ class WithoutADevice : public CommandTest {};
 TEST_F(WithoutADevice, RaysAreTraced)
 {
     const std::string scene = write_scene("scene.json", R"({"kind": "ray_traced", "samples": 16})");
-    const Ran with = penumbra({"mask", scene, "-o", path("with.exr")}), without = penumbra({"mask", scene, "-o", path("without.exr")}, no_device);
+    const Ran with = penumbra({"mask", scene, "-o", path("with.exr")}),
+              without = penumbra({"mask", scene, "-o", path("without.exr")}, no_device);
     EXPECT_EQ(with.code, 0) << with.err;
     EXPECT_EQ(without.code, 0) << without.err;
     EXPECT_EQ(without.err, "");

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string hash_a = "AB/CDEFGHIJKLMNOPABCDEFGHIJKLMNOPABCDEFGH", hash_b = "PO/NMLKJIHGFEDCBAPONMLKJIHGFEDCBAPONMLKJ";
+const std::string hash_a = "AB/CDEFGHIJKLMNOPABCDEFGHIJKLMNOPABCDEFGH", hash_b = "PO/NMLKJIHGFEDCBAPONMLKJIHGFEDCBAPONMLKJI";
 
 std::string content(const fs::path& path)
 {
@@ -93,12 +93,31 @@ TEST_F(DriverCacheFolder, DamageIsThrownAwayAProgramAtATime)
         {"zeroed", [](const fs::path& file) { put(file, std::string(fs::file_size(file), '\0')); }},
         {"shortened", [](const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); }},
         {"longer", [](const fs::path& file) { put(file, content(file) + "x"); }},
-        {"last byte", [](const fs::path& file) { put(file, [&] { std::string bytes = content(file); bytes.back() ^= 1; return bytes; }()); }},
+        {"last byte",
+         [](const fs::path& file) {
+             put(file, [&] {
+                 std::string bytes = content(file);
+                 bytes.back() ^= 1;
+                 return bytes;
+             }());
+         }},
         {"foreign", [](const fs::path& file) { put(file, std::string(20000, 'g')); }},
         {"gone", [](const fs::path& file) { fs::remove(file); }},
-        {"a folder", [](const fs::path& file) { fs::remove(file); put(file / "x", "x"); }},
-        {"an empty folder", [](const fs::path& file) { fs::remove(file); fs::create_directory(file); }},
-        {"a link", [](const fs::path& file) { fs::remove(file); fs::create_symlink("/dev/zero", file); }},
+        {"a folder",
+         [](const fs::path& file) {
+             fs::remove(file);
+             put(file / "x", "x");
+         }},
+        {"an empty folder",
+         [](const fs::path& file) {
+             fs::remove(file);
+             fs::create_directory(file);
+         }},
+        {"a link",
+         [](const fs::path& file) {
+             fs::remove(file);
+             fs::create_symlink("/dev/zero", file);
+         }},
     };
     for (const auto& [name, damage] : damages) {
         for (const std::string& file : {bitcode(hash_a), library(hash_a)}) {
@@ -134,7 +153,7 @@ TEST_F(DriverCacheFolder, FilesInTheFoldersPlaces)
 
 TEST_F(DriverCacheFolder, ADamagedListKnowsNothing)
 {
-    for (const std::string& list : {std::string(), std::string(500, '\0'), std::string("boot\n- \n1 2 3\nzz zz zz zz AB/x\n\xff\xfe")}) {
+    for (const std::string& list : {std::string(), std::string(500, '\0'), std::string("boot\n- \n1 2 3\nzz zz zz zz AB/x\n1 2 3 4 AB/../x\n\xff\xfe")}) {
         recorded();
         put(path(".penumbra-kernels"), list);
         DriverCache(folder_.path(), true);
@@ -219,7 +238,10 @@ TEST(DriverCacheChild, DISABLED_Says)
 class DriverCacheFaults : public ::testing::Test {
 protected:
     using Variables = std::vector<std::pair<std::string, std::string>>;
-    int computes(int warnings, Variables more = {}) { return child("DISABLED_Computes", {"PENUMBRA_TEST_WARNINGS", std::to_string(warnings)}, std::move(more)); }
+    int computes(int warnings, Variables more = {})
+    {
+        return child("DISABLED_Computes", {"PENUMBRA_TEST_WARNINGS", std::to_string(warnings)}, std::move(more));
+    }
     int says(const std::string& part, Variables more = {}) { return child("DISABLED_Says", {"PENUMBRA_TEST_PART", part}, std::move(more)); }
     std::string path(const std::string& name) const { return folder_.path() + '/' + name; }
     std::vector<fs::path> cached() const
@@ -246,7 +268,9 @@ TEST_F(DriverCacheFaults, DamagedFiles)
     const std::vector<std::function<void(const fs::path&)>> faults = {
         [](const fs::path& file) { put(file, ""); },
         [](const fs::path& file) { put(file, std::string(fs::file_size(file), '\0')); },
-        [](const fs::path& file) { if (file.extension() == ".so") fs::resize_file(file, 5000); },
+        [](const fs::path& file) {
+            if (file.extension() == ".so") fs::resize_file(file, 5000);
+        },
         [](const fs::path& file) { put(file, std::string(20000, 'g')); },
     };
     for (std::size_t i = 0; i < faults.size(); ++i) {
@@ -261,7 +285,7 @@ TEST_F(DriverCacheFaults, FoldersThatCannotBeUsed)
     put(path("cache"), "a file");
     EXPECT_EQ(computes(1), 0);
     fs::remove(path("cache"));
-    put(path("cache/pocl"), "a file");
+    put(path("cache/kernels"), "a file");
     EXPECT_EQ(computes(1), 0);
     fs::remove_all(path("cache"));
     EXPECT_EQ(computes(1, {{"POCL_CACHE_DIR", "/proc/x"}}), 0);
