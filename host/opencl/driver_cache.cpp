@@ -56,7 +56,8 @@ std::string program_of(const std::string& path)
 bool is_in_program(const std::string& path)
 {
     const std::string program = program_of(path);
-    return program.size() == 41 && program.size() < path.size() && is_hash(program.substr(0, 2), 2) && is_hash(program.substr(3), 38);
+    return program.size() > 3 && program.size() < path.size() && is_hash(program.substr(0, 2), 2) &&
+           is_hash(program.substr(3), program.size() - 3);
 }
 
 // Files that PoCL writes again at any time, and never loads.

@@ -6,7 +6,7 @@
 // after a restart, which may have lost what was not yet on the disk, everything is read again.
 //
 // Layout of PoCL 3.1, [A-P] being the letters of a hash in base 16:
-//     <folder>/[A-P]{2}/[A-P]{38}/program.bc, last_accessed, build.log
+//     <folder>/[A-P]{2}/[A-P]{37}/program.bc, last_accessed, build.log
 //                                /<kernel>/<local size>-goffs0[-smallgrid]/<kernel>.so
 //     <folder>/tempfile_*           what is being made; renamed when it is whole
 #pragma once

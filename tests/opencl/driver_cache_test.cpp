@@ -2,6 +2,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <map>
 
 #include <sys/mount.h>
 #include <sys/stat.h>
@@ -14,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string hash_a = "AB/CDEFGHIJKLMNOPABCDEFGHIJKLMNOPABCDEFGH", hash_b = "PO/NMLKJIHGFEDCBAPONMLKJIHGFEDCBAPONMLKJI";
+const std::string hash_a = "AB/CDEFGHIJKLMNOPABCDEFGHIJKLMNOPABCDEFG", hash_b = "PO/NMLKJIHGFEDCBAPONMLKJIHGFEDCBAPONMLKJ";
 
 std::string content(const fs::path& path)
 {
@@ -153,7 +154,8 @@ TEST_F(DriverCacheFolder, FilesInTheFoldersPlaces)
 
 TEST_F(DriverCacheFolder, ADamagedListKnowsNothing)
 {
-    for (const std::string& list : {std::string(), std::string(500, '\0'), std::string("boot\n- \n1 2 3\nzz zz zz zz AB/x\n1 2 3 4 AB/../x\n\xff\xfe")}) {
+    for (const std::string& list :
+         {std::string(), std::string(500, '\0'), std::string("boot\n- \n1 2 3\nzz zz zz zz AB/x\n1 2 3 4 AB/../x\n\xff\xfe")}) {
         recorded();
         put(path(".penumbra-kernels"), list);
         DriverCache(folder_.path(), true);
@@ -278,6 +280,18 @@ TEST_F(DriverCacheFaults, DamagedFiles)
         EXPECT_EQ(computes(0), 0) << "fault " << i;
         EXPECT_EQ(computes(0), 0) << "after fault " << i;
     }
+}
+
+// What PoCL wrote in one process is there in the next, and is not built again.
+TEST_F(DriverCacheFaults, SoundKernelsAreKept)
+{
+    ASSERT_EQ(computes(0), 0);
+    std::map<fs::path, fs::file_time_type> before;
+    for (const fs::path& file : cached())
+        if (file.extension() == ".so" || file.extension() == ".bc") before[file] = fs::last_write_time(file);
+    EXPECT_EQ(before.size(), 2u);
+    ASSERT_EQ(computes(0), 0);
+    for (const auto& [file, time] : before) EXPECT_TRUE(fs::exists(file) && fs::last_write_time(file) == time) << file;
 }
 
 TEST_F(DriverCacheFaults, FoldersThatCannotBeUsed)
