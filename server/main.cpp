@@ -74,7 +74,9 @@ int serve(const Options& options, const Environment& environment)
         say("warning: " + unknown);
     const Notifier notifier(environment);
     prepare_environment();
-    Service service(options, options.device.empty() ? Engine() : Engine(options.device), say);
+    Engine engine = options.device.empty() ? Engine() : Engine(options.device);
+    for (const std::string& warning : environment_warnings(engine.device())) say("warning: " + warning);
+    Service service(options, std::move(engine), say);
     const int port = begin(options, service);
     tell(notifier, "STATUS=building kernels and checking the device");
 

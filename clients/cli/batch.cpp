@@ -12,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <penumbra/describe.hpp>
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
@@ -22,6 +23,7 @@
 #include "io/image_format.hpp"
 #include "mask_files.hpp"
 #include "streams.hpp"
+#include "technique/table.hpp"
 #include "technique_flags.hpp"
 #include "verbs.hpp"
 
@@ -115,8 +117,7 @@ public:
                 outcomes_[i].status = Status::skipped;
                 ++finished_;
             }
-        // Without a device no scene can be done: that is one error, not one a scene.
-        if (finished_ < items_.size()) engine_.emplace(open_engine(flags_.device));
+        if (finished_ < items_.size()) open_device();
 
         watch_interrupts();
         start_ = Clock::now();
@@ -127,6 +128,30 @@ public:
     }
 
 private:
+    // Without a device no scene can be done that needs one: that is one error, not one a scene.
+    void open_device()
+    {
+        engine_.emplace(open_engine(flags_.device));
+        try {
+            print_warnings(environment_warnings(engine_->device()));
+        } catch (const Error&) {
+            for (std::size_t i = 0; i < items_.size(); ++i)
+                if (outcomes_[i].status == Status::pending && needs_device(items_[i])) throw;
+        }
+    }
+
+    bool needs_device(const BatchItem& item) const
+    {
+        if (!flags_.device.empty()) return true;
+        try {
+            const nlohmann::json scene = json_in(item.scene);
+            const std::string kind = !flags_.technique.kind.empty() ? flags_.technique.kind : scene.at("technique").at("kind").get<std::string>();
+            return !row_of(kind).on_host;
+        } catch (const std::exception&) {
+            return true; // the default technique; or nothing that can be computed
+        }
+    }
+
     void run_one(const BatchItem& item, Outcome& outcome)
     {
         show(item);

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <penumbra/describe.hpp>
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
@@ -45,6 +46,7 @@ struct Found {
     std::vector<DeviceInfo> devices;
     std::optional<int> selected; // index
     std::optional<Error> error;  // why no device is usable
+    std::vector<std::string> warnings;
 };
 
 Found find(const std::string& selector)
@@ -54,6 +56,7 @@ Found find(const std::string& selector)
         found.devices = list_devices();
         const DeviceInfo chosen = open_engine(selector).device();
         found.selected = chosen.index;
+        found.warnings = environment_warnings(chosen);
         if (!selector.empty()) found.devices = {chosen};
     } catch (const Error& error) {
         found.error = error;
@@ -153,6 +156,7 @@ int run(const Flags& flags)
 
     const Found found = find(flags.device);
     print(flags.json ? json_text(found, environment) : people_text(found, environment));
+    print_warnings(found.warnings);
     if (found.error) throw *found.error;
     return 0;
 }

@@ -3,6 +3,7 @@
 #include <future>
 #include <memory>
 
+#include <penumbra/describe.hpp>
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
@@ -13,6 +14,7 @@
 #include "mask_files.hpp"
 #include "preview.hpp"
 #include "opencl/quirks.hpp"
+#include "technique/table.hpp"
 #include "progress.hpp"
 #include "remote.hpp"
 #include "scene/lights.hpp"
@@ -143,7 +145,8 @@ int run(const Flags& flags)
     // The device opens while the scene is read, which hides most of the drivers' start; its errors come after the scene's. The environment
     // is set first: nothing may read it meanwhile.
     opencl::prepare_environment();
-    std::future<Engine> opening = std::async(std::launch::async, [&] { return open_engine(flags.device); });
+    const Engine engine = open_engine(flags.device);
+    std::future<DeviceInfo> opening = std::async(std::launch::async, [&] { return engine.device(); });
 
     Progress progress;
     progress.step("reading " + flags.scene);
@@ -153,8 +156,11 @@ int run(const Flags& flags)
     scene.technique = in_scene(flags.scene, [&] { return apply(scene.technique, flags.technique); });
     const Technique technique = technique_from(scene.technique);
 
-    progress.step("opening the device");
-    const Engine engine = opening.get();
+    // A device that nothing needs is waited for only where it was asked for.
+    if (!row_of(scene.technique.kind).on_host || !flags.device.empty()) {
+        progress.step("opening the device");
+        print_warnings(environment_warnings(opening.get()));
+    }
 
     Image picture;
     if (!flags.over.empty()) {

@@ -110,7 +110,7 @@ DepthMap empty_view(int width, int height)
 } // namespace
 
 Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::Context>& context, bool with_images)
+               const std::shared_ptr<const opencl::LateContext>& device, bool with_images)
 {
     const Geometry::State& state = geometry.state();
     Views views{empty_view(width, height), empty_view(width, height), {}};
@@ -121,15 +121,15 @@ Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camer
         if (back) views.back = tracer->back(camera, width, height);
     }
     if (!with_images) return views;
-    const auto images = state.images(role, context);
+    const auto images = state.images(role, device);
     if (images.empty()) return views;
-    opencl::Work work(context ? context : opencl::Context::open({}));
+    opencl::Work work(device ? device : std::make_shared<const opencl::LateContext>(""));
     for (const auto& image : images) add_view(work, *image, camera, views.front, views.back);
     return views;
 }
 
 Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
-                               const std::shared_ptr<const opencl::Context>& context)
+                               const std::shared_ptr<const opencl::LateContext>& device)
 {
     Occluders occluders = given;
     if (!needs.front && !needs.back) return occluders;
@@ -141,7 +141,7 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     if (render_back && !casters) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
     const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height, left_out);
     if (render_front || render_back) {
-        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, context, !needs.depth_images);
+        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, device, !needs.depth_images);
         if (render_front) occluders.front = std::move(views.front);
         if (render_back) occluders.back = std::move(views.back);
     }
@@ -157,7 +157,7 @@ Receivers with_depth(const Receivers& given, const Light& light, const Geometry&
 }
 
 Receivers receivers_with_depth(const Receivers& given, const Light& light, const Geometry& geometry,
-                               const std::shared_ptr<const opencl::Context>& context)
+                               const std::shared_ptr<const opencl::LateContext>& device)
 {
     Receivers receivers = given;
     check_pixels(receivers.width, receivers.height, "receivers.resolution");
@@ -165,7 +165,7 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
         resolve_camera(receivers.camera, light, geometry.objects(), receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {
         if (!geometry.state().any(&Object::receives)) missing("receivers.depth", "receive");
-        Views views = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, context);
+        Views views = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, device);
         receivers.depth = std::move(views.front);
         receivers.normals = views.normals.empty() ? nullptr : std::make_shared<const SurfaceNormals>(SurfaceNormals{std::move(views.normals)});
         // What was seen of a depth image is as good as its planes.
@@ -177,11 +177,11 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
 }
 
 std::shared_ptr<const DepthSurface> surface_of(const Receivers& receivers, const Camera& camera,
-                                               const std::shared_ptr<const opencl::Context>& context)
+                                               const std::shared_ptr<const opencl::LateContext>& device)
 {
     if (!receivers.depth || !receivers.depth->from_image) return nullptr;
     if (receivers.surface) return receivers.surface;
-    opencl::Work work(context ? context : opencl::Context::open({}));
+    opencl::Work work(device ? device : std::make_shared<const opencl::LateContext>(""));
     return std::make_shared<const DepthSurface>(depth_surface(fit_depth(work, *receivers.depth, camera), camera));
 }
 

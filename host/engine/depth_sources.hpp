@@ -20,11 +20,11 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
 // The occluders with what `needs` names in place and their camera explicit. Throws invalid_input naming what is missing when there are no
 // objects to render it from, and for maps whose sizes do not fit. The same for receivers: with_depth (engine.hpp).
 Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
-                               const std::shared_ptr<const opencl::Context>& context);
+                               const std::shared_ptr<const opencl::LateContext>& device);
 
 // with_depth (engine.hpp) on a device that is open: depth images are fitted there. Null: one of the environment's choice.
 Receivers receivers_with_depth(const Receivers& given, const Light& light, const Geometry& geometry,
-                               const std::shared_ptr<const opencl::Context>& context);
+                               const std::shared_ptr<const opencl::LateContext>& device);
 
 // What a camera sees of the objects of a role: triangles by rays, depth images by walks. What is not asked for is empty.
 struct Views {
@@ -32,11 +32,11 @@ struct Views {
     std::vector<DepthVector> normals; // of the front's triangles, towards the camera and in its coordinates; empty where images are among it
 };
 Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::Context>& context, bool with_images = true);
+               const std::shared_ptr<const opencl::LateContext>& device, bool with_images = true);
 
 // What is fitted to receivers of somebody else's depth; null for depth that is exact.
 std::shared_ptr<const DepthSurface> surface_of(const Receivers& receivers, const Camera& camera,
-                                               const std::shared_ptr<const opencl::Context>& context);
+                                               const std::shared_ptr<const opencl::LateContext>& device);
 
 // Throws too_large for more pixels than any map may have, before memory is taken for them.
 void check_pixels(int width, int height, std::string_view where);

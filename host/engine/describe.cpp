@@ -88,4 +88,9 @@ std::uint64_t device_bytes(std::span<const Prepared> prepared)
 
 void prepare_environment() { opencl::prepare_environment(); }
 
+std::vector<std::string> environment_warnings(const DeviceInfo& device)
+{
+    return opencl::is_pocl(device.platform) ? opencl::environment_warnings() : std::vector<std::string>();
+}
+
 } // namespace penumbra

@@ -7,14 +7,14 @@
 
 namespace penumbra {
 
-Engine::Engine() : impl_(std::make_unique<Impl>(opencl::Context::open({}))) {}
-Engine::Engine(const std::string& selector) : impl_(std::make_unique<Impl>(opencl::Context::open(selector))) {}
-Engine::Engine(cl_context context, cl_device_id device) : impl_(std::make_unique<Impl>(opencl::Context::wrap(context, device))) {}
+Engine::Engine() : Engine(std::string()) {}
+Engine::Engine(const std::string& selector) : impl_(std::make_unique<Impl>(std::make_shared<const opencl::LateContext>(selector))) {}
+Engine::Engine(cl_context context, cl_device_id device) : impl_(std::make_unique<Impl>(std::make_shared<const opencl::LateContext>(opencl::Context::wrap(context, device)))) {}
 Engine::~Engine() = default;
 Engine::Engine(Engine&&) noexcept = default;
 Engine& Engine::operator=(Engine&&) noexcept = default;
 
-const DeviceInfo& Engine::device() const { return impl_->context->info(); }
+const DeviceInfo& Engine::device() const { return impl_->device->get()->info(); }
 
 void check_device_buffer(cl_mem buffer, int width, int height, const char* what)
 {

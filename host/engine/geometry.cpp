@@ -50,7 +50,7 @@ bool Geometry::State::any_mesh(bool Object::*role) const
 }
 
 std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Object::*role,
-                                                                       const std::shared_ptr<const opencl::Context>& context) const
+                                                                       const std::shared_ptr<const opencl::LateContext>& device) const
 {
     const std::lock_guard lock(fitting_);
     images_.resize(objects->size());
@@ -61,7 +61,7 @@ std::vector<std::shared_ptr<const DepthImage>> Geometry::State::images(bool Obje
         if (!(object.*role) || !object.seen) continue;
         if (!images_[i]) {
             const SeenSurface& seen = *object.seen;
-            opencl::Work work(context ? context : opencl::Context::open({}));
+            opencl::Work work(device ? device : std::make_shared<const opencl::LateContext>(""));
             const DepthFit fit = fit_depth(work, seen.depth, seen.camera);
             images_[i] = std::make_shared<const DepthImage>(depth_image(fit, seen.camera, seen.thickness));
             surfaces_[i] = std::make_shared<const DepthSurface>(depth_surface(fit, seen.camera));

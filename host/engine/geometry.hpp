@@ -27,9 +27,9 @@ struct Geometry::State {
     std::shared_ptr<const Tracer> casters() const { return tracer(&Object::casts, casters_); }
     std::shared_ptr<const Tracer> receivers() const { return tracer(&Object::receives, receivers_); }
 
-    // Depth images among the objects that cast, or that receive, fitted on the device of `context` (null: a device of the environment's
-    // choice). Each is fitted once.
-    [[gnu::visibility("hidden")]] std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::Context>& context) const;
+    // Depth images among the objects that cast, or that receive, fitted on `device` (null: one of the environment's
+    // choice), which is opened only if there are any. Each is fitted once.
+    [[gnu::visibility("hidden")]] std::vector<std::shared_ptr<const DepthImage>> images(bool Object::*role, const std::shared_ptr<const opencl::LateContext>& device) const;
     std::vector<std::pair<std::size_t, DepthQuality>> qualities(bool Object::*role) const; // by object, of those fitted so far
     // The receivers on an object's depth image, where that is the same image: they need no fit of their own. Null: there is none.
     std::shared_ptr<const DepthSurface> surface_of_same(const DepthMap& depth, const Camera& camera) const;

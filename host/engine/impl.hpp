@@ -10,7 +10,7 @@
 namespace penumbra {
 
 struct Engine::Impl {
-    std::shared_ptr<opencl::Context> context;
+    std::shared_ptr<const opencl::LateContext> device;
 };
 
 // Throws usage unless the buffer is there and holds width * height floats.

@@ -109,18 +109,18 @@ private:
     }
 
     // The receivers with their depth; the first light renders it where it is missing.
-    const Receivers& receivers(const Light& light, const std::shared_ptr<const opencl::Context>& context, std::vector<Stage>& stages)
+    const Receivers& receivers(const Light& light, const std::shared_ptr<const opencl::LateContext>& device, std::vector<Stage>& stages)
     {
         if (receivers_ || (receivers_ = keeper_.receivers())) return *receivers_;
         before("the receivers' depth");
         const Stopwatch watch;
-        Receivers complete = receivers_with_depth(*job_.receivers, light, job_.geometry, context);
+        Receivers complete = receivers_with_depth(*job_.receivers, light, job_.geometry, device);
         stages.push_back({"render depth", watch.ms(), 0, 0});
         if (complete.depth->from_image) {
             const Stopwatch fitting;
             const Camera camera = resolve_camera(complete.camera, light, {}, complete.width, complete.height, "receivers.camera");
             complete.surface = job_.geometry.state().surface_of_same(*complete.depth, camera);
-            if (!complete.surface) complete.surface = surface_of(complete, camera, context);
+            if (!complete.surface) complete.surface = surface_of(complete, camera, device);
             stages.push_back({"fit receivers", fitting.ms(), 0, 0});
         }
         receivers_ = std::make_shared<const Receivers>(std::move(complete));
@@ -134,7 +134,7 @@ private:
         const Stopwatch total;
         const auto [made, kept] = prepared(index, frame);
         std::vector<Stage> stages;
-        const Receivers& seen = receivers(job_.lights[index].light, made.state().context, stages);
+        const Receivers& seen = receivers(job_.lights[index].light, made.state().device, stages);
         before("shading");
         Mask mask = engine_.shade(made, seen, job_.bound);
         Report& report = mask.report;

@@ -29,14 +29,14 @@ void refuse_sequence(const Light& light)
                         "masks computes them all, only_frame takes one, with_emission goes on to the next");
 }
 
-std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::Context>& context, const Light& light,
+std::shared_ptr<Prepared::State> new_state(const std::shared_ptr<const opencl::LateContext>& device, const Light& light,
                                            const Technique& technique)
 {
     validate(light);
     refuse_sequence(light);
     check_light(light, technique);
     auto state = std::make_shared<Prepared::State>();
-    state->context = context;
+    state->device = device;
     state->technique = technique;
     state->light = light;
     return state;
@@ -168,7 +168,7 @@ void finish_prepare(opencl::Work& work, Prepared::State& state)
 // Runs the technique's own step and keeps what it made and said.
 void prepare_technique(Prepared::State& state, const Casting& casting)
 {
-    opencl::Work work(state.context);
+    opencl::Work work(state.device);
     Findings findings;
     state.data =
         std::visit([&](const auto& settings) -> PreparedTechnique { return prepare(work, casting, settings, findings); }, state.technique);
@@ -269,7 +269,7 @@ Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
 Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique,
                          const Receivers* receivers) const
 {
-    auto state = new_state(impl_->context, light, technique);
+    auto state = new_state(impl_->device, light, technique);
     Needs needs = needs_of(technique);
     const Geometry::State& objects = geometry.state();
     check_casters(needs, objects.any(&Object::casts), given, kind_of(technique));
@@ -291,7 +291,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
                     .images = {}};
     if (seen && needs.depth_images) {
         const Stopwatch watch;
-        casting.images = objects.images(&Object::casts, state->context);
+        casting.images = objects.images(&Object::casts, state->device);
         state->stages.push_back({"fit depth", watch.ms(), 0, 0});
     }
 
@@ -299,7 +299,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     Occluders complete;
     if (maps) {
         const Stopwatch watch;
-        complete = occluders_with_depth(light, given, geometry, needs, left_out, state->context);
+        complete = occluders_with_depth(light, given, geometry, needs, left_out, state->device);
         state->stages.push_back({"render depth", watch.ms(), 0, 0});
     }
     const bool shown = casting.meshes.empty() && or_front && (by_view || casting.images.empty());
@@ -320,13 +320,13 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     if (!rectangle)
         throw Error::at(ErrorCode::usage, "light.emission", "was prepared for a " + kind_of(before.light), "expected a rectangle");
     auto state =
-        new_state(before.context, RectangleLight{rectangle->center, rectangle->half_u, rectangle->half_v, emission}, before.technique);
+        new_state(before.device, RectangleLight{rectangle->center, rectangle->half_u, rectangle->half_v, emission}, before.technique);
     state->light_view = before.light_view;
     state->channels = emission.channels;
     state->covered = before.covered;
     state->grounds = before.grounds;
     state->warnings = before.warnings;
-    opencl::Work work(state->context);
+    opencl::Work work(state->device);
     state->data = under_other_emission(work, before.data, state->light);
     finish_prepare(work, *state);
     state->shared = before.shared ? before.shared : before.memory;
@@ -336,7 +336,7 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
 Prepared Engine::prepare(const Light& light, const DeviceOccluders& occluders, const Technique& technique) const
 {
     if (const auto refused = device_buffers_of(technique).prepare) throw *refused;
-    auto state = new_state(impl_->context, light, technique);
+    auto state = new_state(impl_->device, light, technique);
     const Needs needs = needs_of(technique);
     const auto taken = [&](cl_mem memory, bool wanted, const char* what) {
         if (!wanted) return cl::Buffer();

@@ -25,8 +25,8 @@ Report report_of(const Prepared::State& state, int width, int height)
         report.device_name = "host, " + std::to_string(thread_count()) + " threads";
         report.device_driver = "Embree 3";
     } else {
-        report.device_name = state.context->info().name;
-        report.device_driver = state.context->info().driver;
+        report.device_name = state.device->get()->info().name;
+        report.device_driver = state.device->get()->info().driver;
     }
     report.width = width;
     report.height = height;
@@ -55,9 +55,9 @@ void make_grey(Image& image)
 DepthMap light_view_depth(const Prepared::State& state, const Receivers& receivers, const Camera& camera, int resolution)
 {
     if (state.receiver_geometry)
-        return views_of(*state.receiver_geometry, &Object::receives, state.light_view, resolution, resolution, true, false, state.context).front;
+        return views_of(*state.receiver_geometry, &Object::receives, state.light_view, resolution, resolution, true, false, state.device).front;
     const Object shown{.name = "receivers", .mesh = {}, .casts = false, .receives = true, .seen = SeenSurface{*receivers.depth, camera, 0}};
-    return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, true, false, state.context).front;
+    return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, true, false, state.device).front;
 }
 
 // What of the light's samples nobody knows.
@@ -154,10 +154,10 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
     const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
 
     const Stopwatch total;
-    const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.context);
+    const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.device);
     const double fit_ms = total.ms();
     Mask mask{.visibility = {}, .report = report_of(state, receivers.width, receivers.height)};
-    opencl::Work work(state.context);
+    opencl::Work work(state.device);
     // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
     const bool clips = !(needs_of(state.technique).depth_images && surface) && !row_of(mask.report.technique).on_host;
     const opencl::Buffer<DepthVector> normals = clips ? upload_normals(work, receivers, surface.get()) : opencl::Buffer<DepthVector>();
@@ -214,7 +214,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
     check_device_buffer(receivers.depth, receivers.width, receivers.height, "receivers.depth");
     check_device_buffer(visibility, receivers.width, receivers.height, "visibility");
 
-    opencl::Work work(state.context, queue);
+    opencl::Work work(state.device->get(), queue);
     work.stage("shade");
     const Receiving receiving{.camera =
                                   resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera"),

@@ -25,7 +25,7 @@ private:
 };
 
 struct Prepared::State {
-    std::shared_ptr<const opencl::Context> context;
+    std::shared_ptr<const opencl::LateContext> device;
     Technique technique;
     Light light;
     Camera light_view;                             // that receivers come in; unused by rays

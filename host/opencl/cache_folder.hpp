@@ -12,4 +12,13 @@ std::string cache_folder();
 // (its content is loaded as code), that we can write to and execute from.
 bool make_private_folder(const std::string& path);
 
+// The same, in words: "" when it can be used, else what is wrong, to go behind its name: "is not a folder".
+std::string unusable_private(const std::string& path);
+
+// Of a folder that somebody else answers for: who may write there is his business.
+std::string unusable(const std::string& path);
+
+// "has 12288 bytes free, expected at least 4194304 (4.00 MiB)" for a folder on a disk without room for a few kernels; "" for others.
+std::string lacks_room(const std::string& path);
+
 } // namespace penumbra::opencl

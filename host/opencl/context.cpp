@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <exception>
 #include <utility>
 
 #include "opencl/cache_folder.hpp"
 #include "opencl/devices.hpp"
+#include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/ledger.hpp"
 #include "opencl/program_cache.hpp"
@@ -54,7 +56,23 @@ Context::Context(cl::Context context, cl::Device device, DeviceInfo info)
     programs_ = std::make_unique<ProgramCache>(context_, device_, quirks_.keep_binaries && !folder.empty() ? folder + "/programs" : "");
 }
 
-Context::~Context() = default;
+Context::~Context()
+{
+    // Launches on a caller's queue are not waited for: what they made is recorded here.
+    if (!unrecorded) return;
+    try {
+        driver_cache().record();
+    } catch (const std::exception&) {
+        // What is not recorded is built again.
+    }
+}
+
+std::shared_ptr<const Context> LateContext::get() const
+{
+    const std::lock_guard lock(opening_);
+    if (!context_) context_ = Context::open(selector_);
+    return context_;
+}
 
 cl::CommandQueue Context::queue() const
 {

@@ -7,10 +7,12 @@
 #include <CL/opencl.hpp>
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <penumbra/engine.hpp>
 
@@ -51,6 +53,9 @@ public:
     // Tests turn this on: every buffer gets a guard tail, checked when the buffer is read or dropped.
     bool canaries = false;
 
+    // Something was launched that the driver may have compiled while nobody waited for it (driver_cache.hpp).
+    mutable std::atomic<bool> unrecorded = false;
+
 private:
     Context(cl::Context context, cl::Device device, DeviceInfo info);
     cl::Context context_;
@@ -61,6 +66,21 @@ private:
     std::shared_ptr<Ledger> ledger_;
     mutable std::mutex launched_mutex_;
     mutable std::set<std::string> launched_;
+};
+
+// A device that is opened when something first needs it. Safe from several threads.
+class LateContext {
+public:
+    explicit LateContext(std::string selector) : selector_(std::move(selector)) {}
+    explicit LateContext(std::shared_ptr<const Context> context) : context_(std::move(context)) {}
+
+    // Throws what Context::open throws; the next call tries again.
+    std::shared_ptr<const Context> get() const;
+
+private:
+    std::string selector_;
+    mutable std::mutex opening_;
+    mutable std::shared_ptr<const Context> context_;
 };
 
 } // namespace penumbra::opencl

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 
+#include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "scene/joined.hpp"
 
@@ -76,7 +77,8 @@ DeviceInfo describe(const cl::Device& device, int index)
 
 std::vector<FoundDevice> find_devices()
 {
-    prepare_environment();
+    // Before PoCL loads anything from there. Where no folder can be used it gives no device.
+    if (driver_folder().problem.empty()) driver_cache();
     std::vector<cl::Platform> platforms;
     try {
         cl::Platform::get(&platforms);
@@ -100,6 +102,10 @@ std::vector<FoundDevice> find_devices()
 FoundDevice choose_device(const std::string& selector)
 {
     const std::vector<FoundDevice> devices = find_devices();
+    if (devices.empty() && !driver_folder().problem.empty()) {
+        throw Error(ErrorCode::device, "no folder can be used for compiled kernels: " + driver_folder().problem,
+                    "name one that can be written to in PENUMBRA_CACHE_DIR");
+    }
     if (devices.empty()) {
         throw Error(
             ErrorCode::device, "no OpenCL device found",

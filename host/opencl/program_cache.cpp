@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "opencl/cache_folder.hpp"
+#include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/program_text.hpp"
 
@@ -48,6 +49,7 @@ ProgramCache::ProgramCache(cl::Context context, cl::Device device, const std::st
                                     device_.getInfo<CL_DEVICE_VERSION>(), platform.getInfo<CL_PLATFORM_VERSION>()}) {
         device_id_ += part + '\n';
     }
+    driver_keeps_ = quirks_of(device_).driver_cache;
     if (!folder.empty() && make_private_folder(folder)) folder_ = folder;
 }
 
@@ -123,6 +125,7 @@ cl::Program ProgramCache::build(const std::string& name, const std::string& text
 cl::Program ProgramCache::build_from_source(const std::string& name, const std::string& text) const
 {
     cl::Program program = translated(name, [&] { return cl::Program(context_, text); });
+    if (driver_keeps_) driver_cache().require_room();
     try {
         program.build(device_, build_options);
     } catch (const cl::Error& error) {

@@ -42,6 +42,7 @@ private:
     cl::Context context_;
     cl::Device device_;
     std::string folder_;
+    bool driver_keeps_ = false; // Quirks::driver_cache
     std::string device_id_; // name, driver and platform versions
     std::atomic<int> built_from_source_ = 0, loaded_from_disk_ = 0;
 

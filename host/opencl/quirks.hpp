@@ -6,6 +6,10 @@
 #define CL_HPP_MINIMUM_OPENCL_VERSION 120
 #include <CL/opencl.hpp>
 
+#include <string>
+#include <string_view>
+#include <vector>
+
 namespace penumbra::opencl {
 
 struct Quirks {
@@ -18,11 +22,29 @@ struct Quirks {
     //     with     cold 5.7 s   warm 0.09 s
     // To give its binary, PoCL compiles every kernel once more. Cold: PENUMBRA_CACHE_DIR is empty; warm: the same process again.
     bool keep_binaries = true;
+    // PoCL: it keeps compiled kernels in a folder (driver_cache.hpp) that must be sound and have room, or it ends the process.
+    bool driver_cache = false;
+    // Debian's PoCL: it links every kernel by the system's `ld`, or ends the process.
+    bool system_linker = false;
+};
+
+// Where PoCL keeps compiled kernels in this process.
+struct DriverFolder {
+    std::string path;
+    bool ours = true;    // false: the user's own POCL_CACHE_DIR, where other programs may keep theirs
+    std::string problem; // why no folder can be used: PoCL will give no device. Empty: one can
 };
 
 // Called before the first OpenCL call of the process: sets what PoCL reads from the environment, unless the user has set it
 // (POCL_SIGFPE_HANDLER, threads from the affinity mask, a private cache folder).
 void prepare_environment();
+
+// What prepare_environment has to say: which folder cannot be used, why, and which one is used instead. It is called first where it was not.
+const std::vector<std::string>& environment_warnings();
+const DriverFolder& driver_folder();
+
+// By the platform's name.
+bool is_pocl(std::string_view platform);
 
 Quirks quirks_of(const cl::Device& device);
 

@@ -1,10 +1,13 @@
 #include "opencl/work.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 
+#include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/ledger.hpp"
+#include "opencl/linker.hpp"
 
 namespace penumbra::opencl {
 namespace {
@@ -110,6 +113,15 @@ void check_limits(const Context& context, const cl::Kernel& kernel, const char* 
 
 Work::Work(std::shared_ptr<const Context> context) : context_(std::move(context)), queue_(context_->queue()) {}
 
+Work::Work(std::shared_ptr<const LateContext> late) : late_(std::move(late)) {}
+
+void Work::open()
+{
+    if (context_) return;
+    context_ = late_->get();
+    queue_ = context_->queue();
+}
+
 Work::Work(std::shared_ptr<const Context> context, cl_command_queue queue) : context_(std::move(context)), own_queue_(false)
 {
     if (!queue) throw Error(ErrorCode::usage, "the command queue is null");
@@ -129,6 +141,7 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes,
 {
     // The room that an empty buffer gets: one element of the largest type, a double16.
     constexpr std::uint64_t least = 128;
+    open();
     const DeviceInfo& device = context_->info();
     const std::uint64_t tail = context_->canaries ? canary_bytes : 0;
     const auto refuse = [&](const std::string& limit) -> Error {
@@ -191,6 +204,7 @@ void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes)
 void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
                    std::uint64_t bytes)
 {
+    open();
     const std::array<std::size_t, 2> whole = whole_groups(name, global, local);
     if (global[0] == 0 || global[1] == 0) return;
     ensure_stage();
@@ -201,6 +215,16 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
         // it.
         const bool first = own_queue_ && context_->first_launch(kernel, name, local);
         if (first) queue_.finish();
+        const Quirks& quirks = context_->quirks();
+        std::optional<RecordingIfSlow> recording;
+        if (quirks.driver_cache && (first || !own_queue_)) {
+            driver_cache().require_room();
+            if (quirks.system_linker && linker().empty()) driver_cache().require_library(name, whole, local);
+            if (first)
+                recording.emplace();
+            else
+                context_->unrecorded = true;
+        }
         const Clock::time_point start = Clock::now();
         queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(whole[0], whole[1]), cl::NDRange(local[0], local[1]), nullptr,
                                     new_event());
@@ -262,7 +286,7 @@ void Work::end_stage()
 {
     if (!running_) return;
     running_ = false;
-    if (own_queue_) translated("stage " + stages_[current_].name, [&] { queue_.finish(); });
+    if (own_queue_ && context_) translated("stage " + stages_[current_].name, [&] { queue_.finish(); });
     stages_[current_].ms += std::max(0.0, milliseconds_since(started_) - compile_ms_);
     total_compile_ms_ += std::exchange(compile_ms_, 0.0);
 }
@@ -302,7 +326,7 @@ void Work::add_device_times()
 
 void Work::check_canaries()
 {
-    if (!context_->canaries) return;
+    if (!context_ || !context_->canaries) return;
     if (const auto violation = context_->ledger()->take_violation()) throw Error(ErrorCode::internal, *violation);
     if (!own_queue_) return; // nothing waits here; reading and dropping check
     translated("checking guard tails", [&] {

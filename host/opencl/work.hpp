@@ -45,10 +45,19 @@ private:
 class Work {
 public:
     explicit Work(std::shared_ptr<const Context> context);                // on a queue of its own
+    explicit Work(std::shared_ptr<const LateContext> late);               // the same, once something needs the device
     Work(std::shared_ptr<const Context> context, cl_command_queue queue); // on the caller's; nothing here then waits for the device
 
-    const Context& context() const { return *context_; }
-    const cl::CommandQueue& queue() const { return queue_; }
+    const Context& context()
+    {
+        open();
+        return *context_;
+    }
+    const cl::CommandQueue& queue()
+    {
+        open();
+        return queue_;
+    }
 
     // Room for `count` elements, not initialised. At least one element is allocated. Throws too_large with the numbers when over the
     // device's largest allocation or its memory.
@@ -80,7 +89,7 @@ public:
                                          std::array<std::size_t, 2> local, std::uint64_t bytes, const Args&... args)
     {
         ensure_stage();
-        launch(context_->kernel(specialisation, kernel, compile_ms_), kernel, global, local, bytes, args...);
+        launch(context().kernel(specialisation, kernel, compile_ms_), kernel, global, local, bytes, args...);
     }
     // The same for a kernel object that nobody else uses.
     template <class... Args> void launch(cl::Kernel kernel, const char* name, std::array<std::size_t, 2> global,
@@ -105,6 +114,7 @@ public:
     std::shared_ptr<MemoryMeter> memory_ptr() const { return memory_; }
 
 private:
+    void open(); // the device, where that waited
     std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes);
@@ -133,7 +143,8 @@ private:
     void add_device_times();
     void check_canaries();
 
-    std::shared_ptr<const Context> context_;
+    std::shared_ptr<const LateContext> late_; // null: `context_` was given
+    std::shared_ptr<const Context> context_;  // null: nothing needed the device so far
     cl::CommandQueue queue_;
     bool own_queue_ = true, profiled_ = true;
     std::shared_ptr<MemoryMeter> memory_ = std::make_shared<MemoryMeter>();

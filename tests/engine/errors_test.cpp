@@ -142,7 +142,7 @@ TEST(EngineErrors, CamerasWithoutAView)
 TEST(EngineErrors, NoSuchDevice)
 {
     for (const std::string selector : {"no device has this name", "99"})
-        expect_error(error_of([&] { Engine none(selector); }), ErrorCode::device, {selector});
+        expect_error(error_of([&] { Engine(selector).device(); }), ErrorCode::device, {selector});
 }
 
 TEST(EngineErrors, RaysNeedObjects)

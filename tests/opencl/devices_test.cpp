@@ -141,7 +141,7 @@ TEST(Environment, CacheFolderIsPrivate)
 {
     const TemporaryFolder folder;
     EXPECT_EQ(run_in_child("Environment.DISABLED_Prepared",
-                           {{"PENUMBRA_CACHE_DIR", folder.path() + "/a/b"}, {"PENUMBRA_TEST_FOLDER", folder.path() + "/a/b/pocl"}}),
+                           {{"PENUMBRA_CACHE_DIR", folder.path() + "/a/b"}, {"PENUMBRA_TEST_FOLDER", folder.path() + "/a/b/kernels"}}),
               0);
 }
 
@@ -149,7 +149,7 @@ TEST(Environment, CacheFolderIsPrivate)
 TEST(Environment, UnwritableCacheFolder)
 {
     const TemporaryFolder folder;
-    const std::string substitute = folder.path() + "/penumbra-" + std::to_string(geteuid());
+    const std::string substitute = folder.path() + "/penumbra-kernels-" + std::to_string(geteuid());
     EXPECT_EQ(run_in_child("Environment.DISABLED_Prepared",
                            {{"PENUMBRA_CACHE_DIR", "/dev/null/x"}, {"TMPDIR", folder.path()}, {"PENUMBRA_TEST_FOLDER", substitute}}),
               0);

@@ -26,4 +26,8 @@ PENUMBRA_API std::uint64_t device_bytes(std::span<const Prepared> prepared);
 // private cache folder, no handler of arithmetic signals. For programs, before their first engine; a library's user decides for himself.
 PENUMBRA_API void prepare_environment();
 
+// What that found out for this device, for programs to say once: that a folder for compiled kernels cannot be used, why, and which one is
+// used instead.
+PENUMBRA_API std::vector<std::string> environment_warnings(const DeviceInfo& device);
+
 } // namespace penumbra

@@ -124,17 +124,18 @@ struct DeviceOccluders {
 struct MaskJob;
 struct MaskHooks;
 
-// Safe to use from several threads at once.
+// Safe to use from several threads at once. The device is opened when something first needs it; that throws device when none fits. What shades
+// on the host (ray_traced), and rendering depth from meshes, do not: they work without one.
 class PENUMBRA_API Engine {
 public:
     Engine();                                        // the device that PENUMBRA_DEVICE selects; without it, the first one
-    explicit Engine(const std::string& selector);    // an index, or a part of a device's name; throws device when none fits
+    explicit Engine(const std::string& selector);    // an index, or a part of a device's name
     Engine(cl_context context, cl_device_id device); // the caller's own; retained
     ~Engine();
     Engine(Engine&&) noexcept;
     Engine& operator=(Engine&&) noexcept;
 
-    const DeviceInfo& device() const;
+    const DeviceInfo& device() const; // opened, if it was not
 
     // Prepares and shades. Depth images that the technique needs and the scene lacks are rendered from its objects. With several lights the
     // mask of all together: in each channel the mean by weight, summed in double in the order of the lights; of three channels when one of
