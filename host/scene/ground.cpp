@@ -96,12 +96,20 @@ bool shows_behind(const Ground& ground, const LightFrame& light, const DepthMap&
     return depth.from_image ? behind * 500 > there : behind > 0;
 }
 
-bool all_before(const Object& object, const LightFrame& light, const Ground& ground)
+bool all_before(const TriangleMesh& mesh, const Ground& ground)
 {
-    const auto before = [&](const Vec3& p) { return ground.normal.dot(p) - ground.offset >= -tolerance_at(p); };
-    for (const Imath::V3f& p : object.mesh.positions)
-        if (!before(Vec3(p))) return false;
-    return !object.seen || !shows_behind(ground, light, object.seen->depth, object.seen->camera);
+    return std::all_of(mesh.positions.begin(), mesh.positions.end(), [&](const Imath::V3f& at) {
+        const Vec3 p(at);
+        return ground.normal.dot(p) - ground.offset >= -tolerance_at(p);
+    });
+}
+
+bool lies_in(const Ground& ground, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle)
+{
+    return std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
+        const Vec3 p(mesh.positions[corner]);
+        return std::abs(ground.normal.dot(p) - ground.offset) <= tolerance_at(p);
+    });
 }
 
 } // namespace
@@ -114,22 +122,20 @@ std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object
             const double height = light.directional ? -plane.normal.dot(light.direction) : plane.normal.dot(light.origin) - plane.offset;
             Ground ground = height > 0 ? plane : Ground{-plane.normal, -plane.offset};
             if (!whole_light_before(light, ground)) continue;
+            // Most planes end at the first mesh: what costs more comes after.
+            if (!std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other.mesh, ground); })) continue;
             for (const auto& triangle : object.mesh.triangles)
-                if (in_ground({ground}, object.mesh, triangle))
+                if (lies_in(ground, object.mesh, triangle))
                     for (const std::uint32_t corner : triangle) ground.box.extendBy(Vec3(object.mesh.positions[corner]));
-            if (std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other, light, ground); })) grounds.push_back(ground);
+            const auto seen_behind = [&](const Object& other) { return other.seen && shows_behind(ground, light, other.seen->depth, other.seen->camera); };
+            if (std::none_of(objects.begin(), objects.end(), seen_behind)) grounds.push_back(ground);
         }
     return grounds;
 }
 
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle)
 {
-    return std::any_of(grounds.begin(), grounds.end(), [&](const Ground& ground) {
-        return std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
-            const Vec3 p(mesh.positions[corner]);
-            return std::abs(ground.normal.dot(p) - ground.offset) <= tolerance_at(p);
-        });
-    });
+    return std::any_of(grounds.begin(), grounds.end(), [&](const Ground& ground) { return lies_in(ground, mesh, triangle); });
 }
 
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh)
