@@ -1,0 +1,39 @@
+// Bytes that two processes see: a file in memory (memfd_create(2)), whose descriptor travels over a channel.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "process/descriptor.hpp"
+
+namespace penumbra::server {
+
+class SharedBytes {
+public:
+    SharedBytes() = default;
+    // Room for so many bytes, zeros that take no memory until they are written. Throws std::bad_alloc.
+    explicit SharedBytes(std::size_t size);
+    // What another process made, to read. Throws std::bad_alloc where it cannot be mapped.
+    explicit SharedBytes(Descriptor file);
+    SharedBytes(SharedBytes&& other) noexcept;
+    SharedBytes& operator=(SharedBytes&& other) noexcept;
+    ~SharedBytes();
+
+    char* data() { return bytes_; }
+    std::size_t size() const { return size_; }
+    operator std::string_view() const { return {bytes_, size_}; }
+    int descriptor() const { return file_.get(); }
+
+private:
+    Descriptor file_;
+    char* bytes_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+// Bytes for another process; an invalid descriptor for none. Throws std::bad_alloc.
+Descriptor shared_copy(std::string_view bytes);
+// All of what another process made. Reads, and does not map: a file that shrinks meanwhile ends the copy, not this process.
+std::string copy_of(const Descriptor& file);
+
+} // namespace penumbra::server
