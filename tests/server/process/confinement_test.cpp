@@ -1,0 +1,82 @@
+// What a worker may not do, tried by a process that has closed it to itself.
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include <fcntl.h>
+#include <sys/ptrace.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "process/confinement.hpp"
+
+namespace penumbra::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Runs it in a process of its own, that is to say yes.
+#define EXPECT_IN_CHILD(condition) EXPECT_EXIT(_exit((condition) ? 0 : 1), testing::ExitedWithCode(0), "")
+
+class Confinement : public testing::Test {
+protected:
+    void SetUp() override
+    {
+        GTEST_FLAG_SET(death_test_style, "fast");
+        std::string pattern = (fs::temp_directory_path() / "penumbra-confinement-XXXXXX").string();
+        folder = mkdtemp(pattern.data());
+        fs::create_directory(folder / "open");
+        fs::create_directory(folder / "shut");
+        std::ofstream(folder / "shut" / "secret") << "secret";
+    }
+    void TearDown() override { fs::remove_all(folder); }
+    bool closed() const { return server::close_files({.read = {"/usr"}, .write = {(folder / "open").string()}}); }
+    fs::path folder;
+};
+
+bool can_open(const fs::path& path, int flags)
+{
+    const int file = ::open(path.c_str(), flags | O_CLOEXEC, 0600);
+    if (file >= 0) ::close(file);
+    return file >= 0;
+}
+
+TEST_F(Confinement, FilesElsewhereAreClosed)
+{
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 0) GTEST_SKIP() << "this kernel has no Landlock";
+    EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "secret", O_RDONLY));
+    EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "new", O_WRONLY | O_CREAT));
+    EXPECT_IN_CHILD(closed() && !can_open("/etc/passwd", O_RDONLY));
+    EXPECT_IN_CHILD(closed() && can_open(folder / "open" / "new", O_RDWR | O_CREAT));
+    EXPECT_IN_CHILD(closed() && can_open("/usr/bin/env", O_RDONLY) && !can_open("/usr/new", O_WRONLY | O_CREAT));
+    EXPECT_IN_CHILD(closed() && can_open("/dev/null", O_WRONLY));
+}
+
+TEST_F(Confinement, SocketsAndTracingAreRefused)
+{
+    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_INET, SOCK_STREAM, 0) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_INET6, SOCK_DGRAM, 0) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_NETLINK, SOCK_RAW, 0) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0);
+    EXPECT_IN_CHILD(server::close_calls() && ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) < 0 && errno == EPERM);
+}
+
+TEST_F(Confinement, MemoryIsLimited)
+{
+    constexpr std::size_t mib = std::size_t{1} << 20;
+    const auto takes = [](std::size_t bytes) {
+        const std::unique_ptr<void, decltype(&std::free)> memory(std::malloc(bytes), &std::free);
+        return memory != nullptr;
+    };
+#ifndef __SANITIZE_ADDRESS__
+    EXPECT_IN_CHILD((server::limit_memory(256 * mib), takes(128 * mib) && !takes(512 * mib)));
+#endif
+}
+
+} // namespace
+} // namespace penumbra::test
