@@ -6,6 +6,7 @@
 
 #include "engine/report.hpp"
 #include "engine/state.hpp"
+#include "opencl/machine_memory.hpp"
 #include "opencl/quirks.hpp"
 
 namespace penumbra {
@@ -87,6 +88,8 @@ std::uint64_t device_bytes(std::span<const Prepared> prepared)
 }
 
 void prepare_environment() { opencl::prepare_environment(); }
+
+std::uint64_t machine_memory() { return opencl::machine_memory(); }
 
 std::vector<std::string> environment_warnings(const DeviceInfo& device)
 {

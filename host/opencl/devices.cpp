@@ -6,6 +6,7 @@
 
 #include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
+#include "opencl/machine_memory.hpp"
 #include "scene/joined.hpp"
 
 namespace penumbra::opencl {
@@ -68,6 +69,8 @@ DeviceInfo describe(const cl::Device& device, int index)
     info.type = type_name(device.getInfo<CL_DEVICE_TYPE>());
     info.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
     info.global_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+    // A device of this machine's own memory knows nothing of what this process may use of it.
+    if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) info.global_bytes = std::min<std::uint64_t>(info.global_bytes, machine_memory());
     info.max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     info.local_bytes = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
     info.max_work_group = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();

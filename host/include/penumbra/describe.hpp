@@ -30,4 +30,7 @@ PENUMBRA_API void prepare_environment();
 // used instead.
 PENUMBRA_API std::vector<std::string> environment_warnings(const DeviceInfo& device);
 
+// Bytes that this process may use: the smallest of the machine's memory, what its control groups allow, and its own limit of data.
+PENUMBRA_API std::uint64_t machine_memory();
+
 } // namespace penumbra
