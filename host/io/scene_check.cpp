@@ -1,6 +1,9 @@
 #include "io/scene_check.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <limits>
 
 namespace penumbra {
@@ -8,6 +11,13 @@ namespace penumbra {
 using namespace scene_file;
 
 namespace {
+
+std::string up_to(double high)
+{
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "up to %g", high);
+    return text.data();
+}
 
 // Throws for a value that is not what it may be.
 struct Check {
@@ -20,7 +30,7 @@ struct Check {
         const double number = value.number();
         const bool low = range.above_low ? number > range.low : number >= range.low;
         const bool high = range.below_high ? number < range.high : number <= range.high;
-        if (!low || !high) throw value.expected(expected(range));
+        if (!low || !high) throw value.expected(std::abs(number) > largest ? "a number " + up_to(largest) + " in size" : expected(range));
     }
     void operator()(const OneOfIntegers& integers) const
     {
@@ -42,11 +52,15 @@ struct Check {
                               "expected " + std::to_string(files.low) + " to " + std::to_string(files.high));
         for (const JsonValue& element : elements) element.text();
     }
-    void operator()(const Numbers& numbers) const { value.numbers(numbers.count); }
+    void operator()(const Numbers& numbers) const
+    {
+        for (const double number : value.numbers(numbers.count))
+            if (std::abs(number) > largest) throw value.expected("numbers " + up_to(largest) + " in size");
+    }
     void operator()(const LengthOrAuto&) const
     {
         if (value.json().is_string() && value.json() == "auto") return;
-        if (!value.json().is_number() || !(value.number() > 0)) throw value.expected("a number above 0, or \"auto\"");
+        if (!value.json().is_number() || !(value.number() > 0) || value.number() > largest) throw value.expected("a number above 0, or \"auto\"");
     }
     void operator()(const NameOrNumber&) const
     {
@@ -55,7 +69,11 @@ struct Check {
         else
             value.integer(0, std::numeric_limits<int>::max());
     }
-    void operator()(const Pair&) const { value.positive_pair(); }
+    void operator()(const Pair& pair) const
+    {
+        const Vec2 both = value.positive_pair();
+        if (!(std::max(both.x, both.y) <= pair.high)) throw value.expected("numbers " + up_to(pair.high));
+    }
     void operator()(const Size& size) const
     {
         if (!value.json().is_array() || value.json().size() != 2) throw value.expected("[width, height]");

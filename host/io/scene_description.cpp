@@ -75,7 +75,7 @@ std::vector<Form> light_forms()
              .meaning = "a disc of directions, from everywhere the same",
              .keys = with_axes({kind("directional"),
                                 {.name = "angular_diameter_deg",
-                                 .type = Number{.low = 0, .high = 180, .below_high = true},
+                                 .type = Number{.low = 0, .high = 179.9},
                                  .meaning = "the sun is 0.53",
                                  .unit = "degrees",
                                  .required = true,

@@ -20,8 +20,12 @@ struct Object;
 struct Constant { // this number, or this string: the kind that decides an object's form
     std::variant<int, std::string_view> value;
 };
-struct Number { // finite; the ends of the range belong to it unless it lies above or below them
-    double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+// No number is larger: squares of lengths, and products of three, stay within binary32.
+constexpr double largest = 1e12;
+// No camera's half angle has a larger tangent (89.99 degrees).
+constexpr double largest_tangent = 1e4;
+struct Number { // the ends of the range belong to it unless it lies above or below them
+    double low = -largest, high = largest;
     bool above_low = false, below_high = false;
 };
 struct OneOfIntegers {
@@ -36,12 +40,14 @@ struct Files {  // a list of them
     std::size_t low, high;
     bool or_one; // may be one file instead of a list
 };
-struct Numbers { // a vector or matrix of that many
+struct Numbers { // a vector or matrix of that many, each within `largest`
     std::size_t count;
 };
-struct LengthOrAuto {}; // a number above 0, or "auto"
+struct LengthOrAuto {}; // a number above 0 and up to `largest`, or "auto"
 struct NameOrNumber {}; // a text, or a whole number from 0
-struct Pair {}; // [x, y], or one number for both; above 0
+struct Pair { // [x, y], or one number for both; above 0
+    double high = largest;
+};
 struct Size {   // [width, height]
     std::int64_t low, high;
 };

@@ -16,7 +16,7 @@ constexpr std::int64_t max_resolution = 65536;
 Key tangents(std::string_view otherwise)
 {
     return {.name = "tan_half_fov",
-            .type = Pair{},
+            .type = Pair{largest_tangent},
             .meaning = "tangents of the half angles",
             .otherwise = otherwise,
             .example = "[0.5, 0.5]"};
@@ -90,7 +90,7 @@ Form looking_camera()
                       .fallback = "[0, 1, 0]",
                       .example = "[1, 0, 0]"},
                      {.name = "vertical_fov_deg",
-                      .type = Number{.low = 0, .high = 180, .above_low = true, .below_high = true},
+                      .type = Number{.low = 0, .high = 179.9, .above_low = true},
                       .meaning = "the image's whole height; the width follows its pixels, whose own aspect counts",
                       .unit = "degrees",
                       .otherwise = "`intrinsics`",
@@ -283,7 +283,7 @@ std::vector<std::string_view> kinds_of(const Object& object)
 
 std::string expected(const Number& number)
 {
-    const bool low = std::isfinite(number.low), high = std::isfinite(number.high);
+    const bool low = number.low > -largest, high = number.high < largest;
     std::string words = "a number";
     if (low) words += number.above_low ? " above " + text(number.low) : ", " + text(number.low) + " or more";
     if (high) words += (low ? " and " : " ") + (number.below_high ? "below " + text(number.high) : text(number.high) + " or less");

@@ -84,13 +84,15 @@ TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resource
     });
 }
 
+bool within_largest(float length) { return std::abs(length) <= static_cast<float>(scene_file::largest); } // false: NaN
+
 void place(TriangleMesh& mesh, const JsonObject& section)
 {
     const ObjectPlacement placement = placement_of(section);
     for (Imath::V3f& position : mesh.positions) {
         position = Imath::V3f(placement.placed(Vec3(position)));
-        if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
-            throw section.value().error("has positions beyond float32", "scale and translate are too large");
+        if (!within_largest(position.x) || !within_largest(position.y) || !within_largest(position.z))
+            throw section.value().error("has positions beyond 1e12", "scale and translate are too large, or its file's unit is very small");
     }
 }
 
@@ -104,8 +106,8 @@ void place(SeenSurface& seen, const JsonObject& section)
     const auto scale = static_cast<float>(placement.scale);
     // As the corners of a mesh do, depths end in one point when they are too small for float32.
     for (float& depth : seen.depth.depth) {
-        if (std::isfinite(depth) && !std::isfinite(depth * scale))
-            throw section.value().error("has depths beyond float32", "scale is too large");
+        if (std::isfinite(depth) && !within_largest(depth * scale))
+            throw section.value().error("has depths beyond 1e12", "scale is too large");
         depth = std::max(depth * scale, std::numeric_limits<float>::min());
     }
     if (seen.camera.orthographic) {

@@ -254,9 +254,12 @@ void validate(const Camera& camera, std::string_view where)
     if (!std::isfinite(f.origin.x) || !std::isfinite(f.origin.y) || !std::isfinite(f.origin.z))
         throw Error::at(ErrorCode::invalid_input, std::string(where), "the camera's position is not finite", "expected finite numbers");
     for (const double half : {camera.half_extent.x, camera.half_extent.y})
-        if (!(half > 0) || !std::isfinite(half))
+        // A tangent of 1e4 is 89.99 degrees; nearer to 90 a point's depth is lost in its distance.
+        if (!(half > 0) || !(half <= (camera.orthographic ? std::numeric_limits<double>::max() : 1e4)))
             throw Error::at(ErrorCode::invalid_input, std::string(where) + (camera.orthographic ? ".half_extent" : ".tan_half_fov"),
-                            "is " + std::to_string(half), "expected positive finite numbers: a camera needs a field of view");
+                            "is " + std::to_string(half),
+                            camera.orthographic ? "expected positive finite numbers: a camera needs a field of view"
+                                                : "expected numbers above 0 and up to 10000: a camera needs a field of view of less than 180 degrees");
     if (!std::isfinite(camera.off_axis.x) || !std::isfinite(camera.off_axis.y))
         throw Error::at(ErrorCode::invalid_input, std::string(where), "the image's middle is not at a finite angle", "expected finite numbers");
 }

@@ -12,6 +12,8 @@
 namespace penumbra {
 namespace {
 
+constexpr double furthest_depth = 1e12; // as the largest number of a scene
+
 std::string number(double value)
 {
     char text[32];
@@ -219,8 +221,11 @@ DepthMap decode_depth(RawDepth raw, const DepthEncoding& given, const Vec2& half
         if (!(depth > 0))
             throw Error(ErrorCode::invalid_input, at + ": a stored value of " + number(stored) + " decodes to depth " + number(depth),
                         stored < 0 ? "expected positive depths; camera-space z needs a negative scale" : "expected positive depths; check the encoding");
-        // A disparity may stand for a depth beyond float32: as far away as nothing.
-        map.depth.push_back(depth > std::numeric_limits<float>::max() ? nothing_there : static_cast<float>(depth));
+        if (depth < std::numeric_limits<float>::min())
+            throw Error(ErrorCode::invalid_input, at + ": a stored value of " + number(stored) + " decodes to depth " + number(depth),
+                        "expected depths that binary32 holds; check the encoding");
+        // A disparity may stand for any depth: as far away as nothing.
+        map.depth.push_back(depth > furthest_depth ? nothing_there : static_cast<float>(depth));
     }
     if (beyond > 0 && beyond == there)
         throw Error(ErrorCode::invalid_input, at + ": every value x scale + shift is 0 or less: " + values_text(raw),

@@ -291,6 +291,15 @@ private:
     std::atomic<std::uint64_t> rays_{0}, followed_{0}, behind_{0}, left_{0};
 };
 
+// Embree ends the process for a ray that it cannot cast (Debian builds it with its assertions), and one in millions is enough.
+void check_castable(const Imath::V3f& v)
+{
+    constexpr float most = 1e18F; // Embree's own limit is 1.8e18
+    if (std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most) return;
+    throw Error(ErrorCode::invalid_input, "a ray cannot be cast: it starts at, or goes by, a length beyond 1e18 or none at all",
+                "expected lights, cameras and depth of lengths up to 1e12");
+}
+
 Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey key) const
 {
     // The ray's origin is the point in float32; its direction ends at the light, so that 0 < t < 1 is between them. A sun is endless.
@@ -299,6 +308,7 @@ Tally Visibility::cast(const Receiver& receiver, const Strata& strata, SampleKey
     if (!light_.frame.directional) to_center -= Vec3(origin);
     if (light_.sphere && !light_.coincident()) disc_axes(to_center.normalized(), half_u.length(), half_u, half_v);
     const Imath::V3f c(to_center), u(half_u), v(half_v);
+    for (const Imath::V3f& one : {origin, c, u, v}) check_castable(one);
     const float end = light_.frame.directional ? std::numeric_limits<float>::infinity() : 1.f;
 
     const Imath::V3f n(receiver.normal);

@@ -283,7 +283,11 @@ Ends ends_of(const description::OneOfIntegers& integers)
 Ends ends_of(const description::Boolean&) { return {{true, false}, {0, 1, "true", nullptr}}; }
 Ends ends_of(const description::Text&) { return {{}, {"", 1, "a\nb", nullptr}}; }
 Ends ends_of(const description::File&) { return {{"depth.exr"}, {"", 1, Json::array(), nullptr}}; }
-Ends ends_of(const description::Pair&) { return {{1e-300, {1e-300, 1e300}}, {0, {1, 0}, {0, 1}, {1}, {1, 1, 1}, "1", -1}}; }
+Ends ends_of(const description::Pair& pair)
+{
+    const double high = pair.high, above = std::nextafter(high, INFINITY);
+    return {{1e-9, {1e-9, high}}, {0, {1, 0}, {0, 1}, {1}, {1, 1, 1}, "1", -1, above, {1, above}}};
+}
 
 Ends ends_of(const description::Numbers& numbers)
 {

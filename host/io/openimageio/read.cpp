@@ -145,6 +145,10 @@ private:
     void check_tiff() const
     {
         constexpr int black_is_zero = 1, rgb = 2;
+        // Its reader adds this to a row, as int: near 2^31 it never comes to the end. (2^32 - 1, -1 here, means all.)
+        constexpr int most_rows = 1 << 24;
+        if (const int rows = spec().get_int_attribute("tiff:RowsPerStrip", -1); rows > most_rows)
+            throw broken(where_, "is a TIFF with strips of " + std::to_string(rows) + " rows", "the image has " + std::to_string(spec().height));
         const int photometric = spec().get_int_attribute("tiff:PhotometricInterpretation", -1);
         if (photometric != black_is_zero && photometric != rgb)
             throw broken(where_, "is a TIFF with photometric interpretation " + std::to_string(photometric),
