@@ -15,6 +15,7 @@
 #include <penumbra/error.hpp>
 
 #include "heap.hpp"
+#include "isolate.hpp"
 #include "scene/joined.hpp"
 #include "streams.hpp"
 #include "verbs.hpp"
@@ -83,6 +84,7 @@ CLI::App* add_verb(CLI::App& program, const char* name, const char* verb_summary
 {
     CLI::App* app = program.add_subcommand(name, verb_summary)->group("Verbs");
     app->formatter(std::make_shared<VerbHelp>(usage));
+    app->add_flag("--isolate", "work in a process of its own: a file that crashes a reader costs this command alone, with one clear line");
     return app;
 }
 
@@ -93,6 +95,7 @@ int main(int argc, char** argv)
     using namespace penumbra;
     cli::use_huge_pages();
     try {
+        if (const auto arguments = cli::isolated_arguments(argc, argv)) return cli::run_isolated(*arguments);
         return cli::run(argc, argv);
     } catch (const Error& error) {
         cli::print_error(error.what());
