@@ -11,11 +11,13 @@
 #include <thread>
 #include <vector>
 
+#include <fcntl.h>
+
 #include <penumbra/describe.hpp>
-#include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 
 #include "http/service.hpp"
+#include "masks/worker.hpp"
 #include "process/descriptors.hpp"
 #include "process/notify.hpp"
 #include "process/options.hpp"
@@ -50,11 +52,19 @@ void tell(const Notifier& notifier, const std::string& state)
     if (const std::string wrong = notifier.tell(state); !wrong.empty()) say("warning: " + wrong);
 }
 
+std::string workers_text(const Options& options, const Greeting& greeting)
+{
+    std::string closed;
+    for (const std::string& what : greeting.closed) closed += (closed.empty() ? "" : ", ") + what;
+    return "workers: " + std::to_string(options.slots) + ", each with " + std::to_string(greeting.memory >> 20) + " MiB; closed to them: " +
+           (closed.empty() ? "nothing, as this kernel offers no way" : closed) + "\n";
+}
+
 // What goes before the first request. Gives the port.
 int begin(const Options& options, Service& service)
 {
     const int port = service.bind();
-    say("penumbra-server " + version() + "\n" + startup_text(options) + "listening on " + options.host + " port " + std::to_string(port));
+    say("penumbra-server " + version() + "\n" + startup_text(options) + workers_text(options, service.greeting()) + "listening on " + options.host + " port " + std::to_string(port));
     if (!is_loopback(options.host) && options.token.empty())
         say("warning: everybody who reaches " + options.host + " can use this service; set a token, or put it behind a proxy");
     return port;
@@ -73,10 +83,8 @@ int serve(const Options& options, const Environment& environment)
         !unknown.empty())
         say("warning: " + unknown);
     const Notifier notifier(environment);
-    prepare_environment();
-    Engine engine = options.device.empty() ? Engine() : Engine(options.device);
-    for (const std::string& warning : environment_warnings(engine.device())) say("warning: " + warning);
-    Service service(options, std::move(engine), say);
+    Service service(options, say);
+    for (const std::string& warning : service.greeting().warnings) say("warning: " + warning);
     const int port = begin(options, service);
     tell(notifier, "STATUS=building kernels and checking the device");
 
@@ -90,7 +98,7 @@ int serve(const Options& options, const Environment& environment)
             say("ready");
             tell(notifier, "READY=1\nSTATUS=ready on " + options.host + " port " + std::to_string(port));
             watchdog.emplace(
-                notifier, [&](auto within) { return answers_health(options.host, port, within); }, say);
+                notifier, [&](auto within) { return service.works() && answers_health(options.host, port, within); }, say);
         } catch (...) {
             failure = std::current_exception();
             failed = true;
@@ -129,6 +137,13 @@ int run(const std::vector<std::string>& arguments)
         return 0;
     }
     const Environment environment = [](const char* name) -> const char* { return std::getenv(name); };
+    // Not for users: how the service starts its workers.
+    constexpr std::string_view worker = "--worker=";
+    if (!arguments.empty() && arguments.front().starts_with(worker)) {
+        fcntl(worker_channel, F_SETFD, FD_CLOEXEC);
+        return work(options_from({arguments.begin() + 1, arguments.end()}, [](const char*) -> const char* { return nullptr; }),
+                    arguments.front().substr(worker.size()), Channel(Descriptor(worker_channel)));
+    }
     return serve(options_from(arguments, environment), environment);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,8 @@ template <class Call> void guarded(httplib::Response& response, Call&& call)
     } catch (const Error& error) {
         Connection::current().inside = error.what();
         answer(response, problem_from(error));
+    } catch (const std::bad_alloc&) {
+        answer(response, out_of_memory());
     } catch (const std::exception& error) {
         Connection::current().inside = error.what();
         answer(response, defect());

@@ -28,19 +28,6 @@ struct RequestCost {
     double upload_ms = 0, queue_ms = 0, decode_ms = 0, compute_ms = 0, encode_ms = 0;
 };
 
-// A request's body. Memory that no byte has come for is not touched.
-class Body {
-public:
-    explicit Body(std::size_t size) : bytes_(std::make_unique_for_overwrite<char[]>(size)), size_(size) {}
-    char* data() { return bytes_.get(); }
-    std::size_t size() const { return size_; }
-    operator std::string_view() const { return {bytes_.get(), size_}; }
-
-private:
-    std::unique_ptr<char[]> bytes_;
-    std::size_t size_;
-};
-
 class Connection final : public httplib::Stream {
 public:
     // Takes the socket, and gives it back to the lobby when it goes. `lobby` outlives it.

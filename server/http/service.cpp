@@ -11,11 +11,11 @@
 
 #include "http/connection.hpp"
 #include "http/service_http.hpp"
-#include "process/ready.hpp"
 
 namespace penumbra::server {
 namespace {
 
+constexpr std::chrono::milliseconds last_work{900}; // of requests in flight when the service ends
 constexpr int backlog = 1024; // connections that the kernel keeps for us; the HTTP library asks for 5
 
 bool is_request_id(std::string_view id)
@@ -41,6 +41,18 @@ std::string random_prefix()
     char text[16];
     std::snprintf(text, sizeof(text), "%08x-", random());
     return text;
+}
+
+PoolOptions pool_of(const Options& options, std::string program)
+{
+    return {.program = std::move(program), .arguments = arguments_of(options), .workers = static_cast<std::size_t>(options.slots)};
+}
+
+Greeting greeting_of(WorkerPool& pool)
+{
+    Greeting greeting = greeting_from(pool.start().text);
+    if (!greeting.problem.empty()) throw Error(static_cast<ErrorCode>(greeting.code), greeting.problem);
+    return greeting;
 }
 
 } // namespace
@@ -113,9 +125,10 @@ void Service::Http::begin(httplib::Request& request, Connection& connection)
     request.ranges.clear();
 }
 
-Service::Service(Options options, Engine engine, Log log)
-    : options_(std::move(options)), engine_(std::move(engine)), log_(std::move(log)),
-      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)),
+Service::Service(Options options, Log log, std::string program)
+    : options_(std::move(options)), log_(std::move(log)),
+      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)), pool_(pool_of(options_, std::move(program)), log_),
+      greeting_(greeting_of(pool_)), device_(greeting_.device + "\n" + greeting_.driver),
       scenes_(static_cast<std::uint64_t>(options_.scenes_bytes), static_cast<std::size_t>(options_.scenes),
               std::chrono::seconds(options_.scenes_s)),
       id_prefix_(random_prefix()), started_s_(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),
@@ -140,9 +153,20 @@ int Service::bind()
 
 void Service::become_ready()
 {
-    check_known_mask(engine_);
-    warm(engine_);
+    // One after another: the first builds the kernels that are missing, the others find them.
+    const Deadline patient(std::chrono::hours(1));
+    for (std::size_t i = 0; i < static_cast<std::size_t>(options_.slots); ++i) {
+        auto worker = pool_.lease_number(i, patient);
+        const CallReply answer = reply_from(worker.call(text_of(Call{.kind = Call::Kind::warm, .seconds = 3600}), {}, patient).text);
+        if (answer.problem) throw Error(ErrorCode::device, answer.inside.empty() ? answer.problem->detail : answer.inside);
+    }
     warm_ = true;
+}
+
+bool Service::works() const
+{
+    const WorkerPool::Counts counts = pool_.counts();
+    return counts.idle > 0 || counts.since_finished < std::chrono::seconds(options_.deadline_s);
 }
 
 void Service::serve()
@@ -156,6 +180,7 @@ void Service::stop()
 {
     draining_ = true;
     stopped_ = true;
+    pool_.end_within(last_work);
     http_->stop();
 }
 

@@ -9,12 +9,15 @@
 #include <string_view>
 #include <vector>
 
-#include <penumbra/engine.hpp>
-
 #include "http/metrics.hpp"
+#include "masks/call.hpp"
+#include "masks/crashes.hpp"
+#include "masks/kept_upload.hpp"
 #include "masks/scene_store.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
+#include "process/shared_bytes.hpp"
+#include "process/worker_pool.hpp"
 
 namespace httplib {
 struct Request;
@@ -24,17 +27,17 @@ struct Response;
 namespace penumbra::server {
 
 struct Route;
-class Body;
 
 class Service {
 public:
     using Log = std::function<void(std::string_view line)>; // called from many threads
-    Service(Options options, Engine engine, Log log);
+    // Starts the first worker, a process of `program` (penumbra-server; by default this one). Throws what keeps it from its work: no device.
+    Service(Options options, Log log, std::string program = "/proc/self/exe");
     ~Service();
 
     // Binds; gives the port. Throws usage when the address cannot be had.
     int bind();
-    // Checks the device and warms every technique; then /readyz says ready. Throws what they throw.
+    // Has each worker check the device and launch every technique; then /readyz says ready. Throws Problem.
     void become_ready();
     // Answers until stop(); returns when what was in flight is done.
     void serve();
@@ -44,6 +47,10 @@ public:
     void stop();
 
     Gate& gate() { return gate_; }
+    WorkerPool& workers() { return pool_; }
+    const Greeting& greeting() const { return greeting_; } // of the first worker
+    // A worker is free, or one has finished within the longest time that a request has.
+    bool works() const;
 
 private:
     class Http;
@@ -57,15 +64,17 @@ private:
     void check_body_headers(const Request& request, const Route& route) const;
 
     // service_masks.cpp: what computes.
-    Body read_body(const Request& request) const;
+    SharedBytes read_body(const Request& request) const;
     void post_mask(const Request& request, Response& response);
     void post_scene(const Request& request, Response& response);
     void post_kept_mask(const Request& request, Response& response);
     void get_scene(const Request& request, Response& response);
     void delete_scene(const Request& request, Response& response);
     Gate::Guard enter_slot();
-    void send_mask(Response& response, const MaskTask& task, const MaskFormat& format);
-    std::string describe(const KeptScene& scene);
+    // Has a worker do it. `digest` names the request where it ends its worker.
+    template <class Digest> CallReply computed(const Call& call, std::span<const int> files, Message& message, const Digest& digest);
+    void send_mask(Response& response, CallReply answer, const Message& message, const MaskFormat& format);
+    std::string describe(const KeptUpload& scene);
 
     // service_routes.cpp
     void set_routes();
@@ -75,10 +84,13 @@ private:
     void finished(const Request& request, const Response& response);
 
     const Options options_;
-    const Engine engine_;
     const Log log_;
     Gate gate_;
-    SceneStore scenes_;
+    WorkerPool pool_;
+    const Greeting greeting_;
+    const std::string device_; // and its driver, as masks depend on them
+    Crashes crashes_;
+    StoreOf<KeptUpload> scenes_;
     mutable Metrics metrics_;
     const std::string id_prefix_;
     std::atomic<bool> warm_ = false, draining_ = false, stopped_ = false;

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "http/browser_guard.hpp"
-#include "http/multipart.hpp"
+#include "masks/multipart.hpp"
 #include "http/route.hpp"
 #include "http/service_http.hpp"
 #include "masks/mask_format.hpp"

@@ -1,16 +1,16 @@
 // The calls that compute: masks of scenes that come along, and of scenes that are kept.
 #include <algorithm>
+#include <array>
 #include <future>
 #include <optional>
 
 #include <nlohmann/json.hpp>
 
 #include "http/answer.hpp"
-#include "http/multipart.hpp"
+#include "masks/multipart.hpp"
 #include "http/service_http.hpp"
 #include "masks/mask_format.hpp"
 #include "masks/masks.hpp"
-#include "masks/work_limits.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -58,12 +58,12 @@ private:
 } // namespace
 
 // The body, whole, as long as announced. It goes past the HTTP library's reader, which copies it twice.
-Body Service::read_body(const Request& request) const
+SharedBytes Service::read_body(const Request& request) const
 {
     Connection& connection = Connection::current();
     const auto uploading = Deadline::Clock::now();
     const std::size_t length = static_cast<std::size_t>(length_from(request.get_header_value("Content-Length")).value_or(0));
-    Body body(length);
+    SharedBytes body(length);
     const std::size_t came = connection.read_body(body.data(), length);
     if (connection.too_slow())
         throw Problem(408, "slow_body",
@@ -90,22 +90,48 @@ Gate::Guard Service::enter_slot()
     return slot;
 }
 
+template <class Digest> CallReply Service::computed(const Call& call, std::span<const int> files, Message& message, const Digest& digest)
+{
+    const Deadline& deadline = Connection::current().request();
+    if (crashes_.any()) crashes_.check(digest());
+    auto worker = pool_.lease(call.id, deadline);
+    Call timed = call;
+    timed.seconds = std::max(std::chrono::duration<double>(deadline.end() - Deadline::Clock::now()).count(), 0.0);
+    try {
+        message = worker.call(text_of(timed), files, deadline);
+    } catch (const Problem& problem) {
+        if (problem.reason == "crashed") {
+            const std::string name = digest();
+            crashes_.note(name);
+            Connection::current().inside = "the worker ended; the request's digest: " + name;
+        }
+        throw;
+    }
+    if (!call.id.empty()) worker.keeps(call.id);
+    CallReply answer = reply_from(message.text);
+    if (!answer.problem) return answer;
+    Connection::current().inside = answer.inside;
+    throw *answer.problem;
+}
+
 void Service::post_mask(const Request& request, Response& response)
 {
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const MaskChoice choice = choice_of(request);
     const MaskFormat& format = negotiate(request.get_header_value("Accept"), choice.image);
-    const Body body = read_body(request);
-    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
-    const Tag tag(body.size(), [&] { return etag_of(engine_, id_of(parts), choice, format); });
+    const SharedBytes body = read_body(request);
+    const std::string form = boundary_of(connection.content_type);
+    const auto parts = parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
+    const auto content = [&] { return id_of(parts); };
+    const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
-    const auto decoding = Deadline::Clock::now();
-    const MaskTask task = task_of(parts, choice, options_, connection.request());
-    connection.cost.decode_ms = seconds_since(decoding) * 1000;
-    send_mask(response, task, format);
+    const std::array files{body.descriptor()};
+    Message message;
+    const Call call{.kind = Call::Kind::mask, .form = form, .choice = choice, .format = std::string(format.format)};
+    send_mask(response, computed(call, files, message, content), message, format);
     tag.set_on(response);
 }
 
@@ -114,19 +140,18 @@ void Service::post_scene(const Request& request, Response& response)
     if (options_.scenes == 0) throw Problem(403, "no_scenes", "this service keeps no scenes (--scenes 0)");
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
-    const Body body = read_body(request);
-    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
-    const std::string id = id_of(parts);
+    SharedBytes body = read_body(request);
+    const std::string form = boundary_of(connection.content_type);
+    const std::string id = id_of(parse_multipart(body, form, static_cast<std::size_t>(options_.parts)));
     auto scene = scenes_.find(id, true);
     response.status = scene ? 200 : 201;
     if (!scene) {
         const auto slot = enter_slot();
-        const auto decoding = Deadline::Clock::now();
-        scene = std::make_shared<KeptScene>(id, parts, options_, connection.request());
-        const MaskTask task = scene->task({}, {}, scene->first_choice(), options_, connection.request());
-        connection.cost.decode_ms = seconds_since(decoding) * 1000;
-        check_work(task, options_);
-        prepare_all(engine_, task, connection.request());
+        const std::array files{body.descriptor()};
+        Message message;
+        const CallReply answer = computed({.kind = Call::Kind::keep, .form = form, .id = id}, files, message, [&] { return id; });
+        connection.cost.decode_ms = answer.decode_ms;
+        scene = std::make_shared<KeptUpload>(id, std::move(body), form, answer.scene.value(), [this, id] { pool_.forget(id); });
         scenes_.keep(scene);
     }
     response.set_header("Location", "/v1/scenes/" + id);
@@ -141,30 +166,42 @@ void Service::post_kept_mask(const Request& request, Response& response)
     if (!scene) throw no_scene();
     const MaskChoice choice = choice_of(request);
     const MaskFormat& format = negotiate(request.get_header_value("Accept"), choice.image);
-    const Body body = read_body(request);
+    const SharedBytes body = read_body(request);
+    std::string form;
     std::vector<Part> parts;
     std::string_view patch = body;
     if (body.size() > 0 && !is_json(connection.content_type)) {
-        parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+        form = boundary_of(connection.content_type);
+        parts = parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
         const Part* const part = find_scene(parts, options_);
         patch = part ? part->bytes : std::string_view();
     }
-    const Tag tag(body.size(), [&] { return etag_of(engine_, scene->content_of(patch, parts), choice, format); });
+    const auto content = [&] { return KeptScene::content_of(scene->id(), patch, parts); };
+    const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
-    const auto decoding = Deadline::Clock::now();
-    const MaskTask task = scene->task(patch, parts, choice, options_, connection.request());
-    connection.cost.decode_ms = seconds_since(decoding) * 1000;
-    send_mask(response, task, format);
+    const std::array files{scene->body().descriptor(), body.descriptor()};
+    Message message;
+    const Call call{.kind = Call::Kind::kept,
+                    .form = scene->form(),
+                    .id = scene->id(),
+                    .patch_form = form,
+                    .choice = choice,
+                    .format = std::string(format.format)};
+    CallReply answer = computed(call, files, message, content);
+    if (answer.scene) scene->set_size(*answer.scene);
+    send_mask(response, std::move(answer), message, format);
     tag.set_on(response);
     scenes_.tidy();
 }
 
-void Service::send_mask(Response& response, const MaskTask& task, const MaskFormat& format)
+void Service::send_mask(Response& response, CallReply answer, const Message& message, const MaskFormat& format)
 {
     RequestCost& cost = Connection::current().cost;
-    MaskReply reply = compute_mask(engine_, task, format, options_, Connection::current().request());
+    MaskReply& reply = answer.reply;
+    if (message.files.empty()) throw Error(ErrorCode::internal, "a worker's answer without its mask");
+    cost.decode_ms = answer.decode_ms;
     cost.technique = reply.technique;
     cost.compute_ms = reply.compute_ms;
     cost.encode_ms = reply.encode_ms;
@@ -180,14 +217,14 @@ void Service::send_mask(Response& response, const MaskTask& task, const MaskForm
     response.status = 200;
     response.set_header("Server-Timing", server_timing(reply.stages));
     if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
-    response.body = std::move(reply.bytes);
+    response.body = copy_of(message.files.front());
     response.set_header("Content-Type", std::string(format.media_type));
 }
 
-std::string Service::describe(const KeptScene& scene)
+std::string Service::describe(const KeptUpload& scene)
 {
     const nlohmann::ordered_json json = {
-        {"id", scene.id()}, {"expires_s", scenes_.seconds_left(scene.id())}, {"bytes", scene.bytes()}, {"warnings", scene.warnings()}};
+        {"id", scene.id()}, {"expires_s", scenes_.seconds_left(scene.id())}, {"bytes", scene.bytes()}, {"warnings", scene.facts().warnings}};
     return json.dump(2, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

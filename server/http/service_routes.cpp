@@ -101,7 +101,7 @@ void Service::set_documents()
         });
     };
     serve_document("/v1/techniques", techniques_json(), "application/json");
-    serve_document("/v1/devices", devices_json(list_devices(), engine_.device().index), "application/json");
+    serve_document("/v1/devices", greeting_.devices_json, "application/json");
     serve_document("/openapi.json", openapi_json(options_), "application/json");
     for (const Asset& asset : page_assets())
         serve_document(literal_pattern(asset.path), std::string(asset.bytes), std::string(asset.media_type));
@@ -111,19 +111,27 @@ void Service::ready(Response& response) const
 {
     if (draining_) return answer(response, Problem(503, "draining", "the service is about to end", 5));
     if (!warm_) return answer(response, Problem(503, "not_ready", "the service is still starting", 5));
+    if (!works()) return answer(response, Problem(503, "no_worker", "no worker is free, and none has finished for as long as a request may take", 5));
     response.set_content("ready\n", "text/plain");
 }
 
 std::string Service::metrics_text()
 {
     const Gate::Counts counts = gate_.counts();
-    const SceneStore::Counts kept = scenes_.counts();
+    const WorkerPool::Counts workers = pool_.counts();
+    const auto kept = scenes_.counts();
     std::string device;
-    for (const char c : engine_.device().name) device += c == '"' || c == '\\' || c == '\n' ? ' ' : c;
+    for (const char c : greeting_.device) device += c == '"' || c == '\\' || c == '\n' ? ' ' : c;
     return metrics_.text({{"penumbra_requests_admitted", "", static_cast<double>(counts.admitted)},
                           {"penumbra_queue_depth", "", static_cast<double>(counts.waiting)},
                           {"penumbra_requests_computing", "", static_cast<double>(counts.computing)},
-                          {"penumbra_ready", "", warm_ && !draining_ ? 1.0 : 0.0},
+                          {"penumbra_ready", "", warm_ && !draining_ && works() ? 1.0 : 0.0},
+                          {"penumbra_workers", "state=\"starting\"", static_cast<double>(workers.starting)},
+                          {"penumbra_workers", "state=\"idle\"", static_cast<double>(workers.idle)},
+                          {"penumbra_workers", "state=\"busy\"", static_cast<double>(workers.busy)},
+                          {"penumbra_workers_started_total", "", static_cast<double>(workers.started)},
+                          {"penumbra_workers_crashed_total", "", static_cast<double>(workers.crashed)},
+                          {"penumbra_workers_overdue_total", "", static_cast<double>(workers.overdue)},
                           {"penumbra_kept_scenes", "", static_cast<double>(kept.scenes)},
                           {"penumbra_kept_scene_bytes", "", static_cast<double>(kept.bytes)},
                           {"penumbra_kept_device_bytes", "", static_cast<double>(kept.device_bytes)},

@@ -97,10 +97,10 @@ std::uint64_t KeptScene::bytes() const
     return bytes;
 }
 
-std::string KeptScene::content_of(std::string_view patch, std::span<const Part> extra) const
+std::string KeptScene::content_of(std::string_view id, std::string_view patch, std::span<const Part> extra)
 {
     Digest digest;
-    digest.add(id_).add(patch);
+    digest.add(id).add(patch);
     for (const Part& part : extra) digest.add(part.name).add(part.bytes);
     return digest.hex();
 }

@@ -34,8 +34,8 @@ public:
     std::uint64_t device_bytes() const { return cache_.device_bytes(); }
     void forget_results() const { cache_.clear(); }
 
-    // Names what a task of that patch and those parts depends on.
-    std::string content_of(std::string_view patch, std::span<const Part> extra) const;
+    // Names what a task of that patch and those parts depends on, for the scene of that id.
+    static std::string content_of(std::string_view id, std::string_view patch, std::span<const Part> extra);
 
     // What to compute a mask from: the scene with `patch` (SceneDocument::patched), an empty one to take it as it stands. The images that
     // the patch names are among `extra` and the kept parts; of one name, the extra part counts. Throws Error and Problem.

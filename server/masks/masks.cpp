@@ -150,7 +150,7 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
     return reply;
 }
 
-std::string etag_of(const Engine& engine, std::string_view content, const MaskChoice& choice, const MaskFormat& format)
+std::string etag_of(std::string_view device, std::string_view content, const MaskChoice& choice, const MaskFormat& format)
 {
     Digest digest;
     digest.add(content)
@@ -159,8 +159,7 @@ std::string etag_of(const Engine& engine, std::string_view content, const MaskCh
         .add(choice.image == MaskImage::bound ? "bound" : "mask")
         .add(format.format)
         .add(version())
-        .add(engine.device().name)
-        .add(engine.device().driver);
+        .add(device);
     return "\"sha256-" + digest.hex() + "\"";
 }
 

@@ -71,8 +71,8 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
                        const Deadline& deadline);
 
 // A strong entity tag, quotes and all. `content` names all that was sent (id_of, KeptScene::content_of); the mask depends on that, on which
-// of the scene's it is, on the format, the program and the device.
-std::string etag_of(const Engine& engine, std::string_view content, const MaskChoice& choice, const MaskFormat& format);
+// of the scene's it is, on the format, the program and the `device` with its driver.
+std::string etag_of(std::string_view device, std::string_view content, const MaskChoice& choice, const MaskFormat& format);
 
 // Whether an If-None-Match header names the tag (RFC 9110, 13.1.2; weak tags of the same text count).
 bool names_tag(std::string_view header, std::string_view tag);

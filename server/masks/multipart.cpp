@@ -1,4 +1,4 @@
-#include "http/multipart.hpp"
+#include "masks/multipart.hpp"
 
 #include <algorithm>
 #include <cstring>

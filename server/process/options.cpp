@@ -72,6 +72,12 @@ const std::array rows{
               "slowest body or answer, on average, that is waited for after its first 5 seconds",
               {1, giga},
               &Options::transfer_bytes_s},
+    OptionRow{"memory",
+              "bytes",
+              "most memory of the service; 0: what its control group allows, or the machine has. Three quarters are the workers', in even "
+              "shares",
+              {0, std::int64_t{1} << 50},
+              &Options::memory},
     OptionRow{"slots", "requests", "requests that are decoded, computed and encoded at the same time", {1, 256}, &Options::slots},
     OptionRow{
         "queue", "requests", "further requests that may be uploading or waiting; more are refused with 503", {0, 1024}, &Options::queue},
@@ -179,6 +185,14 @@ Options options_from(const std::vector<std::string>& arguments, const Environmen
     }
     check_together(options);
     return options;
+}
+
+std::vector<std::string> arguments_of(const Options& options)
+{
+    std::vector<std::string> arguments;
+    for (const OptionRow& row : rows)
+        if (!row.secret) arguments.push_back(flag_of(row) + "=" + std::visit([&](auto member) { return text_of(options.*member); }, row.member));
+    return arguments;
 }
 
 void check_together(const Options& options)

@@ -35,6 +35,7 @@ struct Options {
     std::int64_t transfer_bytes_s = 16384;
 
     // Limits of the service.
+    std::int64_t memory = 0;
     std::int64_t slots = 2;
     std::int64_t queue = 16;
     std::int64_t io_threads = 32;
@@ -65,6 +66,9 @@ std::string environment_of(const OptionRow& row); // "PENUMBRA_SERVER_BODY_BYTES
 // What the environment says, then what the arguments say on top. Throws usage naming the flag or variable and what it takes.
 using Environment = std::function<const char*(const char*)>; // as std::getenv
 Options options_from(const std::vector<std::string>& arguments, const Environment& environment);
+
+// Arguments that say the same, without the token: for processes of the service's own.
+std::vector<std::string> arguments_of(const Options& options);
 
 // Throws usage for options that do not go together.
 void check_together(const Options& options);

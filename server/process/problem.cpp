@@ -29,6 +29,8 @@ Problem problem_from(const Error& error)
 
 Problem defect() { return problem_from(Error(ErrorCode::internal, {})); }
 
+Problem out_of_memory() { return Problem(503, "memory", "this takes more memory than there is now; send less, or try again", 5); }
+
 std::string_view title_of(int status)
 {
     switch (status) {

@@ -27,6 +27,9 @@ Problem problem_from(const Error& error);
 // Any other exception: its text says nothing to the outside.
 Problem defect();
 
+// std::bad_alloc: 503.
+Problem out_of_memory();
+
 std::string_view title_of(int status);
 std::string json_of(const Problem& problem, std::string_view request_id);
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "fuzz/target.hpp"
-#include "http/multipart.hpp"
+#include "masks/multipart.hpp"
 #include "process/problem.hpp"
 
 using namespace penumbra::server;

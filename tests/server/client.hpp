@@ -192,7 +192,7 @@ private:
 class Running {
 public:
     explicit Running(server::Options options, bool ready = true)
-        : service_(with_free_port(std::move(options)), Engine(), [](std::string_view) {}), port(service_.bind())
+        : service_(with_free_port(std::move(options)), [](std::string_view) {}, PENUMBRA_SERVER), port(service_.bind())
     {
         thread_ = std::thread([this] { service_.serve(); });
         if (ready) service_.become_ready();

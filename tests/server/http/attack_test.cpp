@@ -185,7 +185,7 @@ TEST(Attack, ABodyAfterAnEarlyAnswerIsNoRequest)
 
 TEST(Attack, TwoServicesDoNotShareAPort)
 {
-    server::Service second(server::Options{.port = shared_port(), .device = {}, .token = {}}, Engine(), [](std::string_view) {});
+    server::Service second(server::Options{.port = shared_port(), .device = {}, .token = {}}, [](std::string_view) {}, PENUMBRA_SERVER);
     EXPECT_THROW(second.bind(), Error);
 }
 

@@ -1,5 +1,5 @@
 // What is refused, with which status, and that its detail names what was wrong.
-#include "http/multipart.hpp"
+#include "masks/multipart.hpp"
 #include "process/problem.hpp"
 #include "server/client.hpp"
 

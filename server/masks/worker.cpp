@@ -1,0 +1,215 @@
+#include "masks/worker.hpp"
+
+#include <csignal>
+#include <cstdlib>
+#include <new>
+#include <optional>
+#include <thread>
+
+#include <sys/prctl.h>
+
+#include <penumbra/describe.hpp>
+#include <penumbra/engine.hpp>
+#include <penumbra/error.hpp>
+
+#include "masks/call.hpp"
+#include "masks/kept_scene.hpp"
+#include "masks/multipart.hpp"
+#include "masks/scene_store.hpp"
+#include "masks/work_limits.hpp"
+#include "process/confinement.hpp"
+#include "process/memory.hpp"
+#include "process/ready.hpp"
+#include "process/shared_bytes.hpp"
+
+namespace penumbra::server {
+namespace {
+
+const MaskFormat& format_named(std::string_view format)
+{
+    for (const MaskFormat& known : mask_formats())
+        if (known.format == format) return known;
+    return mask_formats().front();
+}
+
+double milliseconds_since(Deadline::Clock::time_point begin) { return seconds_since(begin) * 1000; }
+
+class Worker {
+public:
+    Worker(const Options& options, const Engine& engine)
+        : options_(options), engine_(engine),
+          scenes_(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), static_cast<std::size_t>(options.scenes),
+                  std::chrono::seconds(options.scenes_s))
+    {
+    }
+
+    void forget(std::string_view id) { scenes_.forget(id); }
+
+    // `bytes`: what goes beside the answer.
+    CallReply answer(const Call& call, std::vector<Descriptor> files, Descriptor& bytes)
+    {
+        const Deadline deadline(std::chrono::duration_cast<Deadline::Clock::duration>(std::chrono::duration<double>(call.seconds)));
+        limit_processor(static_cast<std::uint64_t>(call.seconds + 2) * std::max(std::thread::hardware_concurrency(), 1U));
+        std::vector<SharedBytes> shared;
+        for (Descriptor& file : files) shared.emplace_back(std::move(file));
+        shared.resize(2);
+        switch (call.kind) {
+        case Call::Kind::warm:
+            check_known_mask(engine_);
+            warm(engine_);
+            return {};
+        case Call::Kind::mask:
+            return mask(call, shared[0], deadline, bytes);
+        case Call::Kind::keep:
+            return keep(call, shared[0], deadline);
+        case Call::Kind::kept:
+            return kept(call, shared[0], shared[1], deadline, bytes);
+        }
+        throw Error(ErrorCode::internal, "a call of no kind");
+    }
+
+private:
+    std::vector<Part> parts_of(std::string_view body, const std::string& form) const
+    {
+        return parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
+    }
+
+    CallReply computed(const Call& call, const MaskTask& task, const Deadline& deadline, Deadline::Clock::time_point decoding, Descriptor& bytes)
+    {
+        CallReply answer;
+        answer.decode_ms = milliseconds_since(decoding);
+        answer.reply = compute_mask(engine_, task, format_named(call.format), options_, deadline);
+        bytes = shared_copy(answer.reply.bytes);
+        return answer;
+    }
+
+    CallReply mask(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    {
+        const auto decoding = Deadline::Clock::now();
+        const auto parts = parts_of(body, call.form);
+        const MaskTask task = task_of(parts, call.choice, options_, deadline);
+        return computed(call, task, deadline, decoding, bytes);
+    }
+
+    std::shared_ptr<KeptScene> scene_of(const Call& call, std::string_view body, const Deadline& deadline)
+    {
+        return std::make_shared<KeptScene>(call.id, parts_of(body, call.form), options_, deadline);
+    }
+
+    static SceneFacts facts_of(const KeptScene& scene)
+    {
+        return {.bytes = scene.bytes(), .device_bytes = scene.device_bytes(), .warnings = scene.warnings()};
+    }
+
+    CallReply keep(const Call& call, std::string_view body, const Deadline& deadline)
+    {
+        const auto decoding = Deadline::Clock::now();
+        const auto scene = scene_of(call, body, deadline);
+        const MaskTask task = scene->task({}, {}, scene->first_choice(), options_, deadline);
+        CallReply answer;
+        answer.decode_ms = milliseconds_since(decoding);
+        check_work(task, options_);
+        prepare_all(engine_, task, deadline);
+        scenes_.keep(scene);
+        answer.scene = facts_of(*scene);
+        return answer;
+    }
+
+    CallReply kept(const Call& call, std::string_view body, std::string_view change, const Deadline& deadline, Descriptor& bytes)
+    {
+        const auto decoding = Deadline::Clock::now();
+        auto scene = scenes_.find(call.id, true);
+        if (!scene) {
+            scene = scene_of(call, body, deadline);
+            scenes_.keep(scene);
+        }
+        std::vector<Part> parts;
+        std::string_view patch = change;
+        if (!call.patch_form.empty()) {
+            parts = parts_of(change, call.patch_form);
+            const Part* const part = find_scene(parts, options_);
+            patch = part ? part->bytes : std::string_view();
+        }
+        const MaskTask task = scene->task(patch, parts, call.choice, options_, deadline);
+        CallReply answer = computed(call, task, deadline, decoding, bytes);
+        scenes_.tidy();
+        answer.scene = facts_of(*scene);
+        return answer;
+    }
+
+    const Options& options_;
+    const Engine& engine_;
+    SceneStore scenes_;
+};
+
+// Runs it; whatever it throws becomes an answer.
+template <class Call> CallReply guarded(const Call& call)
+{
+    CallReply answer;
+    try {
+        return call();
+    } catch (const Problem& problem) {
+        answer.problem = problem;
+    } catch (const Error& error) {
+        answer.problem = problem_from(error);
+        answer.inside = error.what();
+    } catch (const std::bad_alloc&) {
+        answer.problem = out_of_memory();
+    } catch (const std::exception& error) {
+        answer.problem = defect();
+        answer.inside = error.what();
+    }
+    return answer;
+}
+
+// What strangers' bytes must not reach is closed before any comes.
+Greeting greet(const Options& options, const std::string& temporary, std::optional<Engine>& engine)
+{
+    Greeting greeting;
+    if (leave_network()) greeting.closed.emplace_back("the network (a namespace)");
+    prctl(PR_SET_PDEATHSIG, SIGKILL); // after what changes rights, which takes it back
+    greeting.memory = worker_memory(options);
+    limit_memory(greeting.memory);
+    prepare_environment();
+    // After the folder of kernels was chosen, which all workers share.
+    if (!temporary.empty()) setenv("TMPDIR", temporary.c_str(), 1);
+    if (close_files(folders_of_a_worker(temporary))) greeting.closed.emplace_back("files (Landlock)");
+    if (close_calls()) greeting.closed.emplace_back("sockets and system calls (seccomp)");
+    engine.emplace(options.device.empty() ? Engine() : Engine(options.device));
+    const DeviceInfo device = engine->device();
+    greeting.device = device.name;
+    greeting.driver = device.driver;
+    greeting.devices_json = devices_json(list_devices(), device.index);
+    greeting.warnings = environment_warnings(device);
+    return greeting;
+}
+
+} // namespace
+
+int work(const Options& options, const std::string& temporary, Channel channel)
+{
+    std::optional<Engine> engine;
+    Greeting greeting;
+    try {
+        greeting = greet(options, temporary, engine);
+    } catch (const Error& error) {
+        greeting.problem = error.what();
+        greeting.code = static_cast<int>(error.code());
+    }
+    if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
+
+    Worker worker(options, *engine);
+    for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
+        if (message.text.starts_with("forget")) {
+            worker.forget(std::string_view(message.text).substr(6));
+            continue;
+        }
+        Descriptor bytes;
+        const CallReply answer = guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); });
+        const int file = bytes.get();
+        if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
+    }
+    return 0;
+}
+
+} // namespace penumbra::server

@@ -1,0 +1,15 @@
+// How much memory the service may use, and what of it is a worker's.
+#pragma once
+
+#include <cstdint>
+
+#include "process/options.hpp"
+
+namespace penumbra::server {
+
+// The smaller of --memory, the control group's limit and the machine's memory, in bytes.
+std::uint64_t memory_limit(const Options& options);
+// Three quarters of that are the workers', in even shares.
+std::uint64_t worker_memory(const Options& options);
+
+} // namespace penumbra::server

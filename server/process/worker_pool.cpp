@@ -1,0 +1,350 @@
+#include "process/worker_pool.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <penumbra/error.hpp>
+
+#include "process/problem.hpp"
+#include "process/wait.hpp"
+
+extern char** environ;
+
+namespace penumbra::server {
+namespace {
+
+// Between two starts of a worker that dies again and again.
+constexpr std::chrono::milliseconds first_pause{100}, longest_pause{10000};
+constexpr std::chrono::minutes longest_start{10}; // kernels may have to be built
+
+Problem ending() { return Problem(503, "draining", "the service is about to end", 5); }
+
+std::string death_of(int status)
+{
+    if (WIFSIGNALED(status)) return std::string("signal ") + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) + ")";
+    return "exit code " + std::to_string(WEXITSTATUS(status));
+}
+
+// For this user alone; empty where there is no place for one.
+std::string new_folder()
+{
+    std::error_code none;
+    std::string pattern = (std::filesystem::temp_directory_path(none) / "penumbra-server-XXXXXX").string();
+    return none || !mkdtemp(pattern.data()) ? std::string() : pattern;
+}
+
+} // namespace
+
+struct WorkerPool::Worker {
+    std::size_t number = 0;
+    State state = State::dead;
+    pid_t process = 0;
+    Channel channel;
+    std::set<std::string, std::less<>> keeps;
+    std::vector<std::string> to_forget;
+    Clock::time_point not_before = Clock::time_point::min(), used = Clock::time_point::min();
+    std::chrono::milliseconds pause{0};
+};
+
+WorkerPool::WorkerPool(PoolOptions options, Say say) : options_(std::move(options)), say_(std::move(say)), folder_(new_folder())
+{
+    for (std::size_t i = 0; i < options_.workers; ++i) {
+        workers_.push_back(std::make_unique<Worker>());
+        workers_.back()->number = i;
+    }
+}
+
+WorkerPool::~WorkerPool()
+{
+    {
+        const std::scoped_lock lock(mutex_);
+        ending_ = true;
+        end_ = Clock::now();
+    }
+    changed_.notify_all();
+    if (supervisor_.joinable()) supervisor_.join();
+    for (const auto& worker : workers_) {
+        if (worker->process <= 0) continue;
+        worker->channel = Channel(); // an idle one ends when its channel does
+        if (worker->state != State::idle) kill(worker->process, SIGKILL);
+    }
+    const auto patience = Clock::now() + std::chrono::seconds(2);
+    for (const auto& worker : workers_) {
+        if (worker->process <= 0) continue;
+        int status = 0;
+        while (waitpid(worker->process, &status, WNOHANG) == 0) {
+            if (Clock::now() >= patience) kill(worker->process, SIGKILL);
+            ::poll(nullptr, 0, 5);
+        }
+    }
+    std::error_code ignored; // there is nobody to tell
+    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
+std::string WorkerPool::folder_of(const Worker& worker) const
+{
+    return folder_.empty() ? std::string() : folder_ + "/" + std::to_string(worker.number);
+}
+
+Message WorkerPool::start()
+{
+    std::unique_lock lock(mutex_);
+    supervisor_ = std::thread([this] { supervise(); });
+    changed_.wait(lock, [&] { return greeting_ || no_greeting_; });
+    if (no_greeting_) std::rethrow_exception(no_greeting_);
+    return std::move(*greeting_);
+}
+
+// Starts dead workers, one after another; the first alone until it has said its greeting.
+void WorkerPool::supervise()
+{
+    std::unique_lock lock(mutex_);
+    while (!ending_) {
+        Clock::time_point when = Clock::time_point::max();
+        Worker* const worker = no_greeting_ ? nullptr : next_dead(when);
+        if (!worker) {
+            if (when == Clock::time_point::max())
+                changed_.wait(lock);
+            else
+                changed_.wait_until(lock, when);
+            continue;
+        }
+        worker->state = State::starting;
+        lock.unlock();
+        std::exception_ptr failure;
+        Message greeting;
+        try {
+            spawn(*worker);
+            // The end of the service ends the wait too.
+            for (auto got = Channel::Got::late; got != Channel::Got::message;) {
+                got = worker->channel.receive(greeting, Clock::now() + std::chrono::milliseconds(100));
+                const std::scoped_lock again(mutex_);
+                if (ending_ || got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
+            }
+        } catch (...) {
+            failure = std::current_exception();
+        }
+        lock.lock();
+        if (failure) {
+            bury(*worker, false);
+            if (!greeting_) no_greeting_ = failure;
+        } else {
+            worker->state = State::idle;
+            ++counts_.started;
+            if (!greeting_) greeting_ = std::move(greeting);
+        }
+        changed_.notify_all();
+    }
+}
+
+WorkerPool::Worker* WorkerPool::next_dead(Clock::time_point& when)
+{
+    for (const auto& worker : workers_) {
+        if (worker->state != State::dead) continue;
+        if (worker->not_before <= Clock::now()) return worker.get();
+        when = std::min(when, worker->not_before);
+    }
+    return nullptr;
+}
+
+void WorkerPool::spawn(Worker& worker)
+{
+    auto [ours, theirs] = Channel::pair();
+    const std::string folder = folder_of(worker);
+    std::error_code ignored; // a worker without a folder takes no meshes, and says so
+    if (!folder.empty()) std::filesystem::create_directory(folder, ignored);
+    std::vector<std::string> words{options_.program, "--worker=" + folder};
+    words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
+    pointers.push_back(nullptr);
+    // dup2 to itself would leave it to be closed at exec.
+    Descriptor other;
+    if (theirs.descriptor() == worker_channel) other = Descriptor(fcntl(worker_channel, F_DUPFD_CLOEXEC, worker_channel + 1));
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, other ? other.get() : theirs.descriptor(), worker_channel);
+    posix_spawn_file_actions_addclosefrom_np(&actions, worker_channel + 1);
+    pid_t process = 0;
+    const int wrong = posix_spawn(&process, options_.program.c_str(), &actions, nullptr, pointers.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (wrong != 0)
+        throw Error(ErrorCode::device, options_.program + ": no worker can be started: " + std::generic_category().message(wrong));
+    const std::scoped_lock lock(mutex_);
+    worker.process = process;
+    worker.channel = std::move(ours);
+}
+
+// With the mutex. The process ends, its place is free to be taken again.
+void WorkerPool::bury(Worker& worker, bool overdue)
+{
+    if (worker.process > 0) {
+        kill(worker.process, SIGKILL);
+        int status = 0;
+        while (waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
+        }
+        if (overdue)
+            ++counts_.overdue;
+        else if (!ending_) {
+            ++counts_.crashed;
+            say_death(worker, status);
+        }
+    }
+    std::error_code ignored;
+    if (!folder_.empty()) std::filesystem::remove_all(folder_of(worker), ignored); // what it has left there
+    worker.process = 0;
+    worker.channel = Channel();
+    worker.keeps.clear();
+    worker.to_forget.clear();
+    worker.state = State::dead;
+    // One that served for a while starts again at once.
+    const bool young = worker.used == Clock::time_point::min();
+    worker.pause = young ? std::clamp(worker.pause * 2, first_pause, longest_pause) : std::chrono::milliseconds(0);
+    worker.not_before = Clock::now() + worker.pause;
+    worker.used = Clock::time_point::min();
+}
+
+void WorkerPool::say_death(const Worker& worker, int status) const
+{
+    say_("warning: worker " + std::to_string(worker.number) + " ended by " + death_of(status) + "; it starts again");
+}
+
+WorkerPool::Lease WorkerPool::lease(std::string_view name, const Deadline& deadline)
+{
+    std::unique_lock lock(mutex_);
+    Worker* best = nullptr;
+    const auto better = [&](const Worker& a, const Worker& b) {
+        const bool a_keeps = !name.empty() && a.keeps.contains(name), b_keeps = !name.empty() && b.keeps.contains(name);
+        if (a_keeps != b_keeps) return a_keeps;
+        return a.keeps.size() != b.keeps.size() ? a.keeps.size() < b.keeps.size() : a.used > b.used; // rather the one whose memory is warm
+    };
+    const auto found = [&] {
+        best = nullptr;
+        for (const auto& worker : workers_)
+            if (worker->state == State::idle && (!best || better(*worker, *best))) best = worker.get();
+        return best || ending_;
+    };
+    if (!changed_.wait_until(lock, deadline.end(), found) || !best) {
+        if (ending_) throw ending();
+        throw Problem(503, "no_worker", "no worker was free in time; they are being started again", 1);
+    }
+    best->state = State::busy;
+    return {*this, *best};
+}
+
+WorkerPool::Lease WorkerPool::lease_number(std::size_t number, const Deadline& deadline)
+{
+    std::unique_lock lock(mutex_);
+    Worker& worker = *workers_.at(number);
+    if (!changed_.wait_until(lock, deadline.end(), [&] { return worker.state == State::idle || ending_; }) || ending_)
+        throw Problem(503, "no_worker", "worker " + std::to_string(number) + " did not start in time", 5);
+    worker.state = State::busy;
+    return {*this, worker};
+}
+
+WorkerPool::Lease::~Lease()
+{
+    if (!worker_) return;
+    {
+        const std::scoped_lock lock(pool_->mutex_);
+        if (worker_->state == State::busy) worker_->state = State::idle;
+    }
+    pool_->changed_.notify_all();
+}
+
+Message WorkerPool::Lease::call(std::string_view text, std::span<const int> files, const Deadline& deadline)
+{
+    Worker& worker = *worker_;
+    std::vector<std::string> to_forget;
+    {
+        const std::scoped_lock lock(pool_->mutex_);
+        if (worker.state != State::busy) throw Problem(503, "no_worker", "the worker is gone", 1);
+        to_forget.swap(worker.to_forget);
+    }
+    bool there = true;
+    for (const std::string& name : to_forget) there = there && worker.channel.send("forget" + name);
+    there = there && worker.channel.send(text, files);
+    Message answer;
+    auto got = there ? Channel::Got::late : Channel::Got::ended;
+    while (got == Channel::Got::late) {
+        const auto now = Clock::now();
+        Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
+        {
+            const std::scoped_lock lock(pool_->mutex_);
+            end = std::min(end, pool_->end_);
+        }
+        if (now >= end) break;
+        // The service's end is looked for now and then: it shortens the wait.
+        got = worker.channel.receive(answer, std::min(end, now + std::chrono::milliseconds(100)));
+    }
+    const std::scoped_lock lock(pool_->mutex_);
+    if (got == Channel::Got::message) {
+        worker.used = pool_->finished_ = Clock::now();
+        return answer;
+    }
+    const bool late = got == Channel::Got::late, ended = Clock::now() >= pool_->end_;
+    pool_->bury(worker, late);
+    pool_->changed_.notify_all();
+    if (ended) throw ending();
+    if (late) throw Problem(504, "deadline", "the request's time was over while it was computed", 1);
+    throw Problem(500, "crashed", "the process that computed this ended; others in flight did not notice. The log has the request's digest");
+}
+
+void WorkerPool::Lease::keeps(const std::string& name)
+{
+    const std::scoped_lock lock(pool_->mutex_);
+    if (worker_->state == State::busy) worker_->keeps.insert(name);
+}
+
+void WorkerPool::forget(const std::string& name)
+{
+    const std::scoped_lock lock(mutex_);
+    for (const auto& worker : workers_) {
+        if (worker->keeps.erase(name) == 0) continue;
+        if (worker->state == State::idle)
+            worker->channel.send("forget" + name);
+        else
+            worker->to_forget.push_back(name);
+    }
+}
+
+void WorkerPool::end_within(std::chrono::milliseconds time)
+{
+    const std::scoped_lock lock(mutex_);
+    end_ = std::min(end_, Clock::now() + time);
+}
+
+WorkerPool::Counts WorkerPool::counts() const
+{
+    const std::scoped_lock lock(mutex_);
+    Counts counts = counts_;
+    for (const auto& worker : workers_) {
+        counts.starting += worker->state == State::dead || worker->state == State::starting;
+        counts.idle += worker->state == State::idle;
+        counts.busy += worker->state == State::busy;
+    }
+    counts.since_finished = Clock::now() - finished_;
+    return counts;
+}
+
+std::vector<pid_t> WorkerPool::processes() const
+{
+    const std::scoped_lock lock(mutex_);
+    std::vector<pid_t> all;
+    for (const auto& worker : workers_)
+        if (worker->process > 0) all.push_back(worker->process);
+    return all;
+}
+
+} // namespace penumbra::server

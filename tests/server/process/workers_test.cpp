@@ -1,0 +1,227 @@
+// Workers may die, hang and run out of memory; the service goes on, and only the request that did it is lost.
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <random>
+
+#include "server/client.hpp"
+#include "server/program.hpp"
+
+namespace penumbra::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+server::Options options_with(std::int64_t deadline_s, std::int64_t slots = 2)
+{
+    server::Options options;
+    options.deadline_s = deadline_s;
+    options.slots = slots;
+    options.rays = std::int64_t{1} << 40;
+    return options;
+}
+
+// Seconds of rays.
+std::string long_request()
+{
+    nlohmann::json scene = scene_json();
+    scene["objects"] = {{{"quad", {{"center", {0, -1, 0}}, {"half_u", {0.5, 0, 0}}, {"half_v", {0, 0, -0.5}}}}}};
+    scene["technique"] = {{"kind", "ray_traced"}, {"samples", 65536}};
+    Parts slow = parts(scene);
+    slow[2].second = text_of(encode_depth(flat(256, 256, 2)));
+    return post(form(slow));
+}
+
+std::string honest_request() { return post(form(parts())); }
+
+void wait_for_busy(int port, int busy) { wait_for_metric(port, "penumbra_workers{state=\"busy\"} " + std::to_string(busy)); }
+void wait_for_idle(int port, int idle) { wait_for_metric(port, "penumbra_workers{state=\"idle\"} " + std::to_string(idle)); }
+
+// Asks a service of one worker, and kills it while it computes.
+Reply killed(Running& running, const std::string& request)
+{
+    std::string text;
+    std::jthread client([&] {
+        Socket socket(running.port);
+        socket.send(request);
+        text = socket.receive();
+    });
+    wait_for_busy(running.port, 1);
+    kill(running.service().workers().processes().front(), SIGKILL);
+    client.join();
+    return Reply(text);
+}
+
+TEST(Workers, OneThatDiesCostsItsOwnRequestOnly)
+{
+    Running running{options_with(60, 1)};
+    const Reply reply = killed(running, long_request());
+    EXPECT_EQ(reply.status, 500);
+    EXPECT_TRUE(holds(reply.body, "\"crashed\"")) << reply.body;
+    // The next one waits for the new worker.
+    EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+    EXPECT_EQ(get(running.port, "/readyz").status, 200);
+    wait_for_metric(running.port, "penumbra_workers_crashed_total 1");
+}
+
+TEST(Workers, ARequestThatEndedTwoIsNotTriedAgain)
+{
+    Running running{options_with(60, 1)};
+    for (int i = 0; i < 2; ++i) {
+        wait_for_idle(running.port, 1);
+        EXPECT_EQ(killed(running, long_request()).status, 500);
+    }
+    const Reply refused = ask(running.port, long_request());
+    EXPECT_EQ(refused.status, 422);
+    EXPECT_TRUE(holds(refused.body, "\"crashed\"")) << refused.body;
+    EXPECT_NE(refused.header("Retry-After"), "");
+    EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+}
+
+// A TIFF with RowsPerStrip 2^31 - 1 and deflate: its reader never comes back.
+std::string looping_tiff()
+{
+    constexpr std::string_view hex = "49492a00080000000a000001040001000000040000000101040001000000040000000201030001000000200000000301030001000000080000000601030001000000010000001101040001000000860000001501030001000000010000001601040001000000ffffff7f17010400010000003400000053010300010000000300000000000000789c0dc3011100101000c18b2082081a780d441041848f228a28a2b8995dc80e849c3ebe7e6640717573787a793bc707392b09c9";
+    std::string bytes;
+    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) bytes += static_cast<char>(std::stoi(std::string(hex.substr(i, 2)), nullptr, 16));
+    return bytes;
+}
+
+TEST(Workers, AnImageThatItsReaderNeverFinishesIsRefused)
+{
+    nlohmann::json scene = scene_json();
+    Parts loop = parts(scene);
+    loop[2].second = looping_tiff();
+    const Reply reply = ask(shared_port(), post(form(loop)));
+    EXPECT_EQ(reply.status, 422);
+    EXPECT_TRUE(holds(reply.detail(), "strips of 2147483647 rows")) << reply.body;
+}
+
+// What never comes back, whatever it hangs in, is ended at the deadline; the slot is free again.
+TEST(Workers, OneThatHangsIsEndedAtTheDeadline)
+{
+    Running running{options_with(2, 1)};
+    const auto begun = Clock::now();
+    std::string text;
+    std::jthread client([&] {
+        Socket socket(running.port);
+        socket.send(long_request());
+        text = socket.receive();
+    });
+    wait_for_busy(running.port, 1);
+    kill(running.service().workers().processes().front(), SIGSTOP);
+    client.join();
+    EXPECT_LT(Clock::now() - begun, 3500ms) << "the deadline, half a second, and a machine that is busy";
+    EXPECT_EQ(Reply(text).status, 504) << text;
+    EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+    wait_for_metric(running.port, "penumbra_workers_overdue_total 1");
+}
+
+TEST(Workers, TheEndOfTheServiceWaitsForNoWorker)
+{
+    const Program program({"--port", "0", "--deadline-s", "60", "--rays", std::to_string(std::int64_t{1} << 40)});
+    const int port = program.port_when_ready();
+    ASSERT_NE(port, 0);
+    Socket socket(port);
+    socket.send(long_request());
+    wait_for_busy(port, 1);
+    const auto begun = Clock::now();
+    kill(program.process, SIGTERM);
+    const Reply reply(socket.receive());
+    EXPECT_EQ(reply.status, 503);
+    EXPECT_EQ(program.wait(), 0);
+    EXPECT_LT(Clock::now() - begun, 2s) << "drain-s, 0, and one second, and what an ending takes";
+}
+
+// The workers' processes are gone with the service, however it ended.
+TEST(Workers, EndWithTheService)
+{
+    std::vector<pid_t> processes;
+    {
+        Running running{options_with(60)};
+        wait_for_idle(running.port, 2);
+        processes = running.service().workers().processes();
+        ASSERT_EQ(processes.size(), 2U);
+    }
+    for (const pid_t process : processes) EXPECT_EQ(kill(process, 0), -1) << process;
+
+    const Program program({"--port", "0"});
+    const int port = program.port_when_ready();
+    ASSERT_NE(port, 0);
+    const std::string list = "/proc/" + std::to_string(program.process) + "/task/" + std::to_string(program.process) + "/children";
+    kill(program.process, SIGKILL);
+    program.wait();
+    // Their channel has ended: they do too.
+    for (int i = 0; i < 500; ++i) {
+        std::ifstream children(list);
+        if (!children) break;
+        std::this_thread::sleep_for(10ms);
+    }
+    EXPECT_FALSE(std::ifstream(list));
+}
+
+// No two are alike, so that none has ended a worker before.
+std::string request_number(int number)
+{
+    nlohmann::json scene = scene_json();
+    scene["light"]["half_u"] = {0.125 + 1e-5 * number, 0, 0};
+    return post(form(parts(scene)));
+}
+
+TEST(Workers, KilledAtRandomTheyLoseTheirOwnRequests)
+{
+    Running running{options_with(60)};
+    constexpr int deaths = 12;
+    std::atomic<bool> over = false;
+    std::atomic<int> number = 0, lost = 0, other = 0;
+    std::mutex mutex;
+    std::map<int, std::string> masks;
+    {
+        std::vector<std::jthread> clients;
+        for (int client = 0; client < 4; ++client)
+            clients.emplace_back([&] {
+                while (!over) {
+                    const int mine = ++number;
+                    const Reply reply = ask(running.port, request_number(mine));
+                    lost += reply.status == 500;
+                    other += reply.status != 500 && reply.status != 200;
+                    const std::scoped_lock lock(mutex);
+                    if (reply.status == 200 && masks.size() < 20) masks[mine] = reply.body;
+                }
+            });
+        std::mt19937 random(5);
+        for (int i = 0; i < deaths; ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(20 + random() % 150)); // moments that nobody has chosen
+            const auto processes = running.service().workers().processes();
+            if (!processes.empty()) kill(processes[random() % processes.size()], SIGKILL);
+        }
+        over = true;
+    }
+    EXPECT_LE(lost, deaths);
+    EXPECT_EQ(other, 0);
+    EXPECT_FALSE(masks.empty());
+    for (const auto& [mine, mask] : masks) EXPECT_EQ(ask(running.port, request_number(mine)).body, mask);
+}
+
+TEST(Workers, ScenesThatTheyKeepSurviveThem)
+{
+    Running running{options_with(60, 1)};
+    const std::string upload = "POST /v1/scenes HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: multipart/form-data; boundary=B\r\n" +
+                               length_of(form(parts())) + "\r\n" + form(parts());
+    const Reply kept = ask(running.port, upload);
+    ASSERT_EQ(kept.status, 201) << kept.body;
+    const std::string id = nlohmann::json::parse(kept.body)["id"];
+    const std::string mask = "POST /v1/scenes/" + id + "/masks HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n";
+    const Reply before = ask(running.port, mask);
+    ASSERT_EQ(before.status, 200) << before.body;
+    kill(running.service().workers().processes().front(), SIGKILL);
+    const Reply lost = ask(running.port, mask); // the service may not have seen that it is gone
+    const Reply after = lost.status == 200 ? lost : ask(running.port, mask);
+    EXPECT_EQ(after.status, 200) << after.body;
+    EXPECT_EQ(after.body, before.body);
+}
+
+} // namespace
+} // namespace penumbra::test
