@@ -84,7 +84,7 @@ template <class Scene> void StoreOf<Scene>::keep(const std::shared_ptr<Scene>& s
     const std::uint64_t bytes = scene->bytes();
     if (bytes > budget_)
         throw Problem(413, "scenes_bytes",
-                      "the scene takes " + std::to_string(bytes) + " bytes to keep; all kept scenes together may take " +
+                      "the scene takes " + std::to_string(bytes) + " bytes to keep; the scenes that a worker keeps may take together " +
                           std::to_string(budget_));
     const std::scoped_lock lock(mutex_);
     if (const auto found = at(scene->id()); found != entries_.end()) entries_.erase(found);

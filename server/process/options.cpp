@@ -97,7 +97,7 @@ const std::array rows{
     OptionRow{"scenes", "scenes", "most scenes that are kept; the longest unused goes first", {0, 65536}, &Options::scenes},
     OptionRow{"scenes-bytes",
               "bytes",
-              "most memory of all kept scenes: their parts, depth, triangles, hierarchies and what is prepared on the device",
+              "most memory of all kept scenes: their parts, depth, triangles, hierarchies and what is prepared on the device; each worker keeps its share",
               {0, 1024 * giga},
               &Options::scenes_bytes},
     OptionRow{"scenes-s", "seconds", "how long a kept scene stays after its last use", {1, 86400}, &Options::scenes_s},
