@@ -9,12 +9,14 @@ import { light_json } from "./light.js";
 /** @typedef {import("./client.js").Files} Files */
 /** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
  * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
+/** What stands in for a large image while the light moves: the same depth at fewer pixels.
+ * @typedef {{size: [number, number], objects: Json[], receivers: Json, files: Files}} Small */
 /** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows,
  * `suggested` the settings that suit it, for techniques that have such a key. `technique` is the kind that suits it ("": the page's first);
  * `drafts` are kinds that may stand in for a traced one while the light moves. `picture` is what the depth belongs to.
  * @typedef {{kind: string, title: string, objects: Json[], occluders: Json, receivers: Json, files: Files, room: Room, light: Light,
  *            fixed_light: string, lights: string[], renders: boolean, suggested: Json, technique: string, drafts: string[],
- *            picture: import("./picture.js").Picture | null}} Source */
+ *            picture: import("./picture.js").Picture | null, small: Small | null}} Source */
 
 const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
 
@@ -26,18 +28,19 @@ export function courtyard_source() {
     room: { middle: [0, 0, 1], reach: 7, low: 1, high: 11 },
     light: {
       kind: "rectangle", position: [-3.4, 6.2, 4.8], target: [0, 0.6, -0.6],
-      width: 0.9, height: 0.9, radius: 0.5, angular_diameter_deg: 4,
+      width: 0.9, length: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
-    technique: "", drafts: [], picture: null,
+    technique: "", drafts: [], picture: null, small: null,
   };
 }
 
 /** One camera's depth image, in the camera's own space: at the origin, looking along -Z. The light begins beside the camera.
- * @param {{name: string, file: Blob, encoding: Json, vertical_fov_deg: number, distance: number, picture?: import("./picture.js").Picture | null}} given
- *   `distance`: how far the middle of the picture is, in scene units
+ * @param {{name: string, file: Blob, encoding: Json, vertical_fov_deg: number, distance: number, picture?: import("./picture.js").Picture | null,
+ *          view?: import("./depth_view.js").DepthView | null}} given
+ *   `distance`: how far the middle of the picture is, in scene units; `view`: its depth at few pixels
  * @returns {Source} */
-export function camera_source({ name, file, encoding, vertical_fov_deg, distance, picture = null }) {
+export function camera_source({ name, file, encoding, vertical_fov_deg, distance, picture = null, view = null }) {
   const camera = { kind: "pinhole", eye: [0, 0, 0], target: [0, 0, -distance], up: [0, 1, 0], vertical_fov_deg };
   const coded = encoding.kind === "planar" && Object.keys(encoding).length === 1 ? {} : { encoding };
   return {
@@ -48,13 +51,20 @@ export function camera_source({ name, file, encoding, vertical_fov_deg, distance
     room: { middle: [0, 0, -distance], reach: 1.6 * distance, low: -1.5 * distance, high: 2 * distance },
     light: {
       kind: "rectangle", position: [-0.7 * distance, 0.8 * distance, -0.5 * distance], target: [0, 0, -distance],
-      width: 0.15 * distance, height: 0.15 * distance, radius: 0.08 * distance, angular_diameter_deg: 4,
+      width: 0.15 * distance, length: 0.15 * distance, radius: 0.08 * distance, angular_diameter_deg: 4,
     },
     // A camera's depth has no back sides.
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "front" },
     // What the service takes by itself for depth alone; it is slow, and these are quick.
     technique: "depth_trace", drafts: ["soft_shadow_map", "shadow_map"], picture,
+    small: view && view.width < view.size[0] ? small_of(view, camera) : null,
   };
+}
+
+/** @param {import("./depth_view.js").DepthView} view @param {Json} camera @returns {Small} */
+function small_of({ file, width, height }, camera) {
+  const name = "small.pfm";
+  return { size: [width, height], objects: [{ depth: name, camera }], receivers: { camera, depth: name }, files: new Map([[name, file]]) };
 }
 
 /** Depth seen from a light's centre, in the light's own space: at the origin, shining along -Z.
@@ -69,11 +79,11 @@ export function light_view_source({ front, back, receiver, encoding, tan_half_fo
     room: { middle: [0, 0, -distance], reach: distance, low: -distance, high: distance },
     light: {
       kind: "rectangle", position: [0, 0, 0], target: [0, 0, -distance],
-      width: 0.15 * distance, height: 0.15 * distance, radius: 0, angular_diameter_deg: 0,
+      width: 0.15 * distance, length: 0.15 * distance, radius: 0, angular_diameter_deg: 0,
     },
     fixed_light: "Only the size can change: these maps were seen from this light's centre along its axis. Another place would need other maps.",
     lights: ["rectangle", "point"], renders: false, suggested: { sides: back ? "both" : "front" },
-    technique: "", drafts: [], picture: null,
+    technique: "", drafts: [], picture: null, small: null,
   };
 }
 

@@ -1,6 +1,6 @@
 // @ts-check
 // A technique and its keys, as controls made from what the service says of it.
-import { button, choice_field, element, flag_field, number_field } from "./fields.js";
+import { button, choice_field, element, flag_field, number_field, prose } from "./fields.js";
 
 /** @typedef {import("./client.js").Technique} Technique */
 /** @typedef {import("./client.js").Json} Json */
@@ -53,11 +53,12 @@ const TRACED = ["depth_trace", "ray_traced"];
 /** What makes a draft quick, for techniques that have such a key. @type {Json} */
 const DRAFTED = { resolution: 96 };
 
-/** The quick technique that may stand in for a traced one while the light moves: the first of the source's drafts that takes the light.
- * @param {Technique[]} techniques @param {Choice} choice @param {{drafts: string[], suggested: Json}} source @param {string} light its kind
- * @returns {Choice | null} */
+/** What may stand in while the light moves: for a traced technique the first of the source's drafts that takes the light; for another on a
+ * large image itself, on the small one.
+ * @param {Technique[]} techniques @param {Choice} choice @param {{drafts: string[], suggested: Json, small: unknown}} source
+ * @param {string} light its kind @returns {Choice | null} */
 export function draft_of(techniques, choice, source, light) {
-  if (!TRACED.includes(choice.kind)) return null;
+  if (!TRACED.includes(choice.kind)) return source.small ? choice : null;
   const kind = source.drafts.find((one) => techniques.some((known) => known.kind === one && known.lights.includes(light)));
   if (!kind) return null;
   const keys = techniques.find((one) => one.kind === kind)?.schema.properties ?? {};
@@ -81,7 +82,7 @@ export function technique_panel(place, techniques, choice, fits, changed) {
   );
   place.replaceChildren(pick.node);
   if (!technique) return;
-  place.append(element("p", { className: "help" }, technique.summary));
+  place.append(element("p", { className: "help" }, ...prose(technique.summary)));
   if (!technique.lights.includes(fits.light))
     place.append(element("p", { className: "notice", role: "status" }, `${label_of(technique.kind)} takes no ${fits.light} light; it takes: ${technique.lights.join(", ")}.`));
 
