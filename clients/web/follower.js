@@ -9,12 +9,17 @@ import { LatestQueue } from "./queue.js";
 /** @typedef {import("./technique_panel.js").Choice} Choice */
 /** @typedef {import("./client.js").MaskReply} MaskReply */
 /** What a mask is of, beside the light's place. @typedef {{choice: Choice, source: Source, light: string}} Of */
-/** @typedef {{source: Source, light: string, a: Choice, b: Choice, draft: Choice | null, comparing: boolean}} State
- *   `draft`: what may stand in for A while the light moves */
+/** @typedef {{source: Source, light: string, a: Choice, b: Choice, draft: Choice | null, stand_in: Choice | null, comparing: boolean}} State
+ *   `draft`: what is seen in A's place while the light moves; `stand_in`: what is where A turns out to be slow */
 
 /** The second mask follows the light at once when it takes less than this; else, as a mask that was drafted, when the light has rested that
  * long. */
 const FOLLOWS_MS = 150;
+
+/** A large image's mask takes seconds of the service, which a light that moves on would share: it is asked for when the light has rested longer. */
+const LARGE_RESTS_MS = 800;
+/** A mask that takes longer has another stand in, and a light that moves on does not wait for it. */
+const PATIENCE_MS = 700;
 
 /** Whether two are one scene, whatever picture is laid over it. @param {Source} one @param {Source} other */
 const same_scene = (one, other) => one.objects === other.objects && one.occluders === other.occluders && one.receivers === other.receivers;
@@ -53,14 +58,22 @@ export class Follower {
   /** Whether A's mask is not that of the state as it is, and whether its technique, settings or scene are others. */
   get stale() {
     const { a_of, a_version, refused, draft } = this.shown;
-    const { a, draft: standing_in, source, light } = this.page.state();
-    const now = (/** @type {Choice} */ choice) => a_of !== null && same(a_of, { choice, source, light });
-    return { late: a_version !== this.version || refused, other: !(now(a) || (draft && standing_in !== null && now(standing_in))) };
+    const { a, draft: quick, stand_in, source, light } = this.page.state();
+    const now = (/** @type {Choice | null} */ choice) => choice !== null && a_of !== null && same(a_of, { choice, source, light });
+    return { late: a_version !== this.version || refused, other: !(now(a) || (draft && (now(quick) || now(stand_in)))) };
   }
 
   /** Times of another technique or scene say nothing. */
   forget_times() {
     this.#taken_ms = { draft: 0, full: Infinity };
+  }
+
+  /** What is asked for in A's place while the light moves; nothing where A's own is as quick. */
+  #draft() {
+    const { draft, stand_in } = this.page.state();
+    const { full, draft: quick } = this.#taken_ms;
+    if (draft) return full > quick ? draft : null;
+    return full > PATIENCE_MS && full < Infinity ? stand_in : null;
   }
 
   /** B's mask is of something else: it does not stand under the new name. */
@@ -78,22 +91,22 @@ export class Follower {
   /** Asks for masks of the state as it is now. @param {boolean} [light_moved] whether the light alone has changed, or all is new: a draft does first */
   update(light_moved = false) {
     this.version++;
-    const { draft: possible, comparing, b, source, light } = this.page.state();
-    // Unless A's own is as quick here.
-    const draft = this.#taken_ms.full > this.#taken_ms.draft ? possible : null;
+    const { comparing, b, source, light } = this.page.state();
+    const draft = this.#draft();
     const { b_of } = this.shown;
     if (b_of && !same(b_of, { choice: b, source, light })) this.#drop_b();
     if (draft && !light_moved) this.#slow_queue.push(() => this.#update_a(null));
-    else this.#queue.push(() => this.#update_a(draft));
+    else this.#queue.push(() => (draft ? this.#update_a(draft) : this.#update_patiently()));
     clearTimeout(this.#rest_timer);
     if (!comparing && !draft) return;
     const asked = this.version;
+    const rest_ms = draft && source.small ? LARGE_RESTS_MS : FOLLOWS_MS;
     const when_rested = () => {
       if (asked !== this.version) return;
-      if (this.#queue.busy) this.#rest_timer = setTimeout(when_rested, FOLLOWS_MS);
+      if (this.#queue.busy) this.#rest_timer = setTimeout(when_rested, rest_ms);
       else this.#slow_queue.push(() => this.#complete(asked));
     };
-    this.#rest_timer = setTimeout(when_rested, FOLLOWS_MS);
+    this.#rest_timer = setTimeout(when_rested, rest_ms);
   }
 
   /** What is missing when the light rests: A in full, and B. @param {number} asked the version that rested */
@@ -126,6 +139,19 @@ export class Follower {
     }
   }
 
+  /** A in full; where that takes long, what is quick stands in. */
+  async #update_patiently() {
+    const asked = this.version;
+    const { stand_in } = this.page.state();
+    const full = this.#update_a(null);
+    const patience = new Promise((then) => setTimeout(() => then("over"), PATIENCE_MS));
+    if (!stand_in || (await Promise.race([full, patience])) !== "over" || this.outage.waiting) return full;
+    this.#taken_ms.full = 2 * PATIENCE_MS;
+    // One slow mask at a time: it may go on for long where the light has moved on.
+    this.#slow_queue.push(() => full);
+    if (asked === this.version) await this.#update_a(stand_in);
+  }
+
   /** @param {Choice | null} draft */
   async #update_a(draft) {
     const asked = this.version;
@@ -136,6 +162,8 @@ export class Follower {
       const { reply, mask } = await this.#ask(choice, draft !== null);
       // The light has gone on, and its draft is there already.
       if (this.#too_late(asked, shown.a_version)) return;
+      // What it stands in for is there already.
+      if (draft && shown.a_version === asked && !shown.draft && !shown.refused) return;
       this.#taken_ms[draft ? "draft" : "full"] = reply.ms;
       this.view.a = mask;
       Object.assign(shown, { a: reply, a_version: asked, a_of: { choice, source, light }, draft: draft !== null, refused: false });

@@ -14,7 +14,7 @@ import { courtyard_source, scene_json } from "./scene.js";
 import { save, SharePanel } from "./share_panel.js";
 import { SourcePanel } from "./source_panel.js";
 import { Stage } from "./stage.js";
-import { draft_of, suggested_choice, technique_panel } from "./technique_panel.js";
+import { draft_of, stand_in_of, suggested_choice, technique_panel } from "./technique_panel.js";
 import { View } from "./view.js";
 import { wire_wipe } from "./wipe.js";
 
@@ -71,7 +71,10 @@ const outage = new Outage((text) => {
 /** The technique that may stand in for A's while the light moves; null: A's own does. */
 const draft_choice = () => (by_id("draft").checked ? draft_of(techniques, a, source, light.kind) : null);
 
-const state = () => ({ source, light: light.kind, a, b, draft: draft_choice(), comparing: view.mode !== "mask" });
+const state = () => ({
+  source, light: light.kind, a, b, comparing: view.mode !== "mask",
+  draft: draft_choice(), stand_in: stand_in_of(techniques, a, source, light.kind),
+});
 
 const busy = new Busy(by_id("busy"));
 
@@ -98,7 +101,11 @@ const follower = new Follower(view, outage, busy, {
     const lit = draft && source.small ? { ...source, ...source.small } : source;
     return client.mask(scene_json(lit, light, choice), lit.files, PFM);
   },
-  show: () => stage.show(),
+  show: () => {
+    stage.show();
+    // The lines to copy depend on the size of the mask that it lies under.
+    if (source.picture) share.refresh();
+  },
   came: (whose, choice) => {
     if (whose === "b") {
       by_id("mask").dataset.versionB = String(follower.shown.b_version);
@@ -183,7 +190,7 @@ function show_resolutions() {
 /** @param {Source} next */
 function use(next) {
   orbit.stop();
-  const other = next.kind !== source.kind;
+  const other = next.kind !== source.kind, last = source;
   source = next;
   // Another kind of source takes the technique that is its own.
   if (other) a = known(next.technique || FIRST.a, 0);
@@ -194,6 +201,10 @@ function use(next) {
   };
   a = suited(a);
   b = suited(b);
+  if (a.kind === next.technique) {
+    const chosen = Object.entries(a.settings).filter(([key, value]) => last.settings[key] !== value);
+    a = { kind: a.kind, settings: { ...next.settings, ...Object.fromEntries(chosen) } };
+  }
   light = next.light;
   follower.forget_masks();
   use_picture(next.picture);
@@ -259,6 +270,7 @@ function wire() {
   by_id("modes").addEventListener("change", (/** @type {any} */ event) => {
     view.mode = event.target.value;
     stage.show();
+    stage.show_overlay();
     update();
   });
   by_id("tone").addEventListener("change", () => {

@@ -17,6 +17,10 @@ export class Outage {
     this.sleep = sleep;
   }
 
+  get waiting() {
+    return this.#wait !== null;
+  }
+
   /** Whether to ask again is all that helps. @param {unknown} error */
   static is(error) {
     return error instanceof NoAnswer || (error instanceof ServiceError && error.status === 503);

@@ -1,6 +1,7 @@
 // @ts-check
 // What is lit: the bundled courtyard, one camera's depth, or depth seen from a light. Each becomes a scene file.
 import { courtyard, courtyard_view } from "./courtyard.js";
+import { CASTER_SIDE } from "./depth_view.js";
 import { light_json } from "./light.js";
 
 /** @typedef {import("./vector.js").Vec3} Vec3 */
@@ -10,12 +11,13 @@ import { light_json } from "./light.js";
 /** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
  * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
 /** What stands in for a large image while the light moves: the same depth at fewer pixels.
- * @typedef {{size: [number, number], objects: Json[], receivers: Json, files: Files}} Small */
+ * @typedef {{size: [number, number], objects: Json[], occluders: Json, receivers: Json, files: Files}} Small */
 /** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows,
- * `suggested` the settings that suit it, for techniques that have such a key. `technique` is the kind that suits it ("": the page's first);
- * `drafts` are kinds that may stand in for a traced one while the light moves. `picture` is what the depth belongs to.
+ * `suggested` the settings that suit it, for techniques that have such a key. `technique` is the kind that suits it ("": the page's first), and
+ * `settings` those of that technique;
+ * `drafts` are kinds that may stand in for a traced one while the light moves, `stand_ins` for one that turns out to be slow. `picture` is what the depth belongs to.
  * @typedef {{kind: string, title: string, objects: Json[], occluders: Json, receivers: Json, files: Files, room: Room, light: Light,
- *            fixed_light: string, lights: string[], renders: boolean, suggested: Json, technique: string, drafts: string[],
+ *            fixed_light: string, lights: string[], renders: boolean, suggested: Json, technique: string, settings: Json, drafts: string[], stand_ins: string[],
  *            picture: import("./picture.js").Picture | null, small: Small | null}} Source */
 
 const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
@@ -31,7 +33,7 @@ export function courtyard_source() {
       width: 0.9, length: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
-    technique: "", drafts: [], picture: null, small: null,
+    technique: "", settings: {}, drafts: [], stand_ins: ["soft_shadow_volume", "shadow_map"], picture: null, small: null,
   };
 }
 
@@ -56,15 +58,28 @@ export function camera_source({ name, file, encoding, vertical_fov_deg, distance
     // A camera's depth has no back sides.
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "front" },
     // What the service takes by itself for depth alone; it is slow, and these are quick.
-    technique: "depth_trace", drafts: ["soft_shadow_map", "shadow_map"], picture,
-    small: view && view.width < view.size[0] ? small_of(view, camera) : null,
+    technique: "depth_trace", settings: view ? samples_for(view.size) : {}, drafts: ["soft_shadow_map", "shadow_map"], stand_ins: [], picture,
+    small: view && Math.max(...view.size) > CASTER_SIDE ? small_of(view, camera) : null,
   };
 }
 
+/** The rays that a service allows for a mask, unless it is told otherwise; and the samples that depth_trace takes by itself. */
+const RAYS = 2 ** 26, SAMPLES = 64;
+
+/** As many samples of a large image as a service allows. @param {[number, number]} size @returns {Json} */
+function samples_for([width, height]) {
+  const samples = Math.max(1, Math.floor(RAYS / (width * height)));
+  return samples < SAMPLES ? { samples } : {};
+}
+
+/** Side of the occluder map of a draft: rendering it is most of its time. */
+const DRAFT_MAP = 96;
+
 /** @param {import("./depth_view.js").DepthView} view @param {Json} camera @returns {Small} */
-function small_of({ file, width, height }, camera) {
-  const name = "small.pfm";
-  return { size: [width, height], objects: [{ depth: name, camera }], receivers: { camera, depth: name }, files: new Map([[name, file]]) };
+function small_of({ file, caster, width, height }, camera) {
+  const files = new Map([["receivers.pfm", file], ["caster.pfm", caster]]);
+  const objects = [{ depth: "caster.pfm", camera }];
+  return { size: [width, height], objects, occluders: { resolution: [DRAFT_MAP, DRAFT_MAP] }, receivers: { camera, depth: "receivers.pfm" }, files };
 }
 
 /** Depth seen from a light's centre, in the light's own space: at the origin, shining along -Z.
@@ -83,7 +98,7 @@ export function light_view_source({ front, back, receiver, encoding, tan_half_fo
     },
     fixed_light: "Only the size can change: these maps were seen from this light's centre along its axis. Another place would need other maps.",
     lights: ["rectangle", "point"], renders: false, suggested: { sides: back ? "both" : "front" },
-    technique: "", drafts: [], picture: null, small: null,
+    technique: "", settings: {}, drafts: [], stand_ins: [], picture: null, small: null,
   };
 }
 

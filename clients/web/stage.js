@@ -11,11 +11,15 @@ import { show_picture_choice } from "./picture_choice.js";
 
 /** Tables follow a moving light this often: nobody reads them faster. */
 const FIGURES_MS = 250;
+/** The drawing over the mask follows as often as masks come at best. */
+const OVERLAY_MS = 40;
 
 const by_id = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
 export class Stage {
   #figures_timer = 0;
+  #overlay_timer = 0;
+  #overlay_drawn = -Infinity;
 
   /** @param {import("./view.js").View} view @param {import("./follower.js").Follower} follower
    * @param {{state: () => State, light: () => Light}} page */
@@ -39,7 +43,6 @@ export class Stage {
     by_id("b_section").hidden = view.mode === "mask";
     show_picture_choice(view);
     this.show_names();
-    this.show_overlay();
     this.#figures_timer ||= setTimeout(() => this.#show_figures(), FIGURES_MS);
   }
 
@@ -68,11 +71,21 @@ export class Stage {
     if (earlier) return `${kind}: earlier`;
     const small = shown.a_of?.source.small;
     const size = small ? ` at ${small.size.join(" x ")}` : "";
-    return shown.draft ? `${kind}: draft${size}; ${a.kind} when the light rests` : kind;
+    const full = kind === a.kind ? "in full" : a.kind;
+    return shown.draft ? `${kind}: draft${size}; ${full} when the light rests` : kind;
+  }
+
+  /** With the browser's next frame, and not with every one: the service may need the same processor. */
+  show_overlay() {
+    if (this.#overlay_timer) return;
+    const rest = this.#overlay_drawn + OVERLAY_MS - performance.now();
+    this.#overlay_timer = setTimeout(() => requestAnimationFrame(() => this.#draw_overlay()), Math.max(0, rest));
   }
 
   /** What casts, where the page knows it, and the light. */
-  show_overlay() {
+  #draw_overlay() {
+    this.#overlay_timer = 0;
+    this.#overlay_drawn = performance.now();
     const overlay = by_id("overlay");
     const ratio = devicePixelRatio || 1;
     overlay.width = Math.max(1, Math.round(overlay.clientWidth * ratio));

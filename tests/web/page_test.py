@@ -21,7 +21,7 @@ class Page(PageTest):
         self.js("document.querySelector(`[name=mode][value=${arguments[0]}]`).click()", mode)
 
     def wait_for_b(self):
-        self.wait_for("const d = document.getElementById('mask').dataset; return d.versionB && d.versionB === d.version")
+        self.wait_for("const d = document.getElementById('mask').dataset; return d.versionB && d.versionB === d.version && d.versionB === d.asked")
 
     def assert_shadowed(self, mask):
         self.assertLess(mask["low"], 30)
@@ -101,8 +101,8 @@ class Page(PageTest):
     def test_the_light_goes_everywhere_and_never_ends_in_an_error(self):
         self.js("document.querySelector('#light details').open = true")
         # Through the pergola and the arch, at their middles, below the floor, on it, behind the wall, on the aim, far away, and back.
-        ways = [(-1.5, 2.2, -1.2), (-1.5, 1, -1.2), (1, 0.35, 1.6), (1.95, 0.2, 1.3), (2.15, 1.9, -1.5), (0, 0.01, 0.5), (0, 0, 0.5), (0, -0.5, 0.5),
-                (0, 2.5, -3.5), (0, 2.5, -4.5), (0, 0.6, -0.6), (-0.6, 0.9, 2.1), (0, -3, 20), (200, 900, -50), (-3.4, 6.2, 4.8)]
+        ways = [(-1.5, 2.2, -1.2), (-1.5, 1, -1.2), (2.15, 1.9, -1.5), (0, 0.01, 0.5), (0, 0, 0.5), (0, -0.5, 0.5), (0, 2.5, -3.5), (0, 2.5, -4.5),
+                (0, 0.6, -0.6), (0, -3, 20), (200, 900, -50), (1, 0.35, 1.6), (-0.6, 0.9, 2.1), (-3.4, 6.2, 4.8)]
         refused = []
         for technique in ("soft_shadow_map", "shadow_map", "soft_shadow_volume"):
             Select(self.find("#technique_a [name=kind]")).select_by_value(technique)
@@ -118,9 +118,9 @@ class Page(PageTest):
                 self.assertNotIn("\n", self.problem())
                 self.assertGreater(self.mask()["high"], 250)
             self.assertEqual(self.problem(), "", "back where it began")
-            self.assert_shadowed(self.mask())
-        print(f"  refused: {refused}", flush=True)
-        self.assertTrue(all("422" in error for error in self.console_errors()))
+            self.assertLess(self.mask()["low"], 30)
+        # Inside a caster a mask may take longer than the service allows: another technique stands in.
+        self.assertTrue(all("422" in error or "504" in error for error in self.console_errors()), refused)
 
     def delay(self, kind, seconds):
         """From now on the page's requests that hold this word, or text with quotes, take longer: so that there is something to see."""
@@ -189,20 +189,21 @@ class Page(PageTest):
         self.wait_for_b()
         self.delay("smoothie", 1.5)
         Select(self.find("#technique_b [name=kind]")).select_by_value("smoothie")
-        self.assertEqual(self.find("#name_b").text, "B  smoothie: to come")
+        self.assertEqual(self.find("#name_b").text, "B smoothie: to come")
         self.wait_for_b()
-        self.assertEqual(self.find("#name_b").text, "B  smoothie")
+        self.assertEqual(self.find("#name_b").text, "B smoothie")
         self.delay("half_u", 1)
         self.set_number("[name=position_x]", 1)
-        self.assertEqual(self.find("#name_b").text, "B  smoothie: earlier")
+        self.assertEqual(self.find("#name_b").text, "B smoothie: earlier")
         self.assertIn("stale_b", self.find("#frame").get_attribute("class"))
         self.wait_for_b()
         self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
 
     def overlay(self):
         """Pixels of the drawing over the mask: how many there are, where their middle is, and a digest."""
-        return self.js(
+        return self.module(
             """
+            await new Promise((then) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(then)), 50));  // it is drawn every 40 ms
             const canvas = document.getElementById("overlay"), {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
             let drawn = 0, x = 0, y = 0, digest = 0;
             for (let i = 0; i < data.length; i += 4) {
@@ -258,7 +259,8 @@ class Page(PageTest):
                 self.assertLessEqual(bottom, height, (width, boxes))
             pad, _, frame = boxes
             self.assertGreaterEqual(pad[0], frame[2], "beside the picture")
-            self.assertEqual(self.js("return document.documentElement.scrollWidth"), width)
+            room, taken = self.js("const page = document.documentElement; return [page.clientWidth, page.scrollWidth]")
+            self.assertLessEqual(taken, room, width)
             self.screenshot(f"page_tablet_{width}x{height}.png")
 
     def test_one_word_for_one_thing_and_code_as_code(self):
@@ -743,7 +745,7 @@ class Away(PageTest):
         self.assertNotEqual(self.mask()["digest"], before)
         self.assertEqual(self.problem(), "")
         self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
-        self.assertTrue(all("ERR_" in error or "404" in error for error in self.console_errors()))
+        self.assertTrue(all("ERR_" in error or "404" in error or "503" in error for error in self.console_errors()))
 
     def test_a_busy_service_says_when(self):
         self.js(
