@@ -18,6 +18,8 @@ const FOLLOWS_MS = 150;
 
 /** A large image's mask takes seconds of the service, which a light that moves on would share: it is asked for when the light has rested longer. */
 const LARGE_RESTS_MS = 800;
+/** Twenty masks a second leave 50 ms for each, of which the page draws in ten. A mask that takes longer is drafted while the light moves. */
+const PACE_MS = 40;
 /** A mask that takes longer has another stand in, and a light that moves on does not wait for it. */
 const PATIENCE_MS = 700;
 
@@ -68,12 +70,13 @@ export class Follower {
     this.#taken_ms = { draft: 0, full: Infinity };
   }
 
-  /** What is asked for in A's place while the light moves; nothing where A's own is as quick. */
+  /** What is asked for in A's place while the light moves; nothing where A's own is as quick, or keeps pace. */
   #draft() {
-    const { draft, stand_in } = this.page.state();
+    const { draft, stand_in, a, source } = this.page.state();
     const { full, draft: quick } = this.#taken_ms;
     if (draft) return full > quick ? draft : null;
-    return full > PATIENCE_MS && full < Infinity ? stand_in : null;
+    if (full < PACE_MS || full === Infinity) return null;
+    return (full > PATIENCE_MS && stand_in) || (source.small && a);
   }
 
   /** B's mask is of something else: it does not stand under the new name. */
@@ -91,7 +94,7 @@ export class Follower {
   /** Asks for masks of the state as it is now. @param {boolean} [light_moved] whether the light alone has changed, or all is new: a draft does first */
   update(light_moved = false) {
     this.version++;
-    const { comparing, b, source, light } = this.page.state();
+    const { comparing, b, source, light, draft: possible } = this.page.state();
     const draft = this.#draft();
     const { b_of } = this.shown;
     if (b_of && !same(b_of, { choice: b, source, light })) this.#drop_b();
@@ -100,7 +103,7 @@ export class Follower {
     clearTimeout(this.#rest_timer);
     if (!comparing && !draft) return;
     const asked = this.version;
-    const rest_ms = draft && source.small ? LARGE_RESTS_MS : FOLLOWS_MS;
+    const rest_ms = draft && possible && source.small ? LARGE_RESTS_MS : FOLLOWS_MS;
     const when_rested = () => {
       if (asked !== this.version) return;
       if (this.#queue.busy) this.#rest_timer = setTimeout(when_rested, rest_ms);
@@ -142,14 +145,15 @@ export class Follower {
   /** A in full; where that takes long, what is quick stands in. */
   async #update_patiently() {
     const asked = this.version;
-    const { stand_in } = this.page.state();
+    const { stand_in, source, a } = this.page.state();
     const full = this.#update_a(null);
     const patience = new Promise((then) => setTimeout(() => then("over"), PATIENCE_MS));
-    if (!stand_in || (await Promise.race([full, patience])) !== "over" || this.outage.waiting) return full;
+    const quick = stand_in ?? (source.small && a);
+    if (!quick || (await Promise.race([full, patience])) !== "over" || this.outage.waiting) return full;
     this.#taken_ms.full = 2 * PATIENCE_MS;
     // One slow mask at a time: it may go on for long where the light has moved on.
     this.#slow_queue.push(() => full);
-    if (asked === this.version) await this.#update_a(stand_in);
+    if (asked === this.version) await this.#update_a(quick);
   }
 
   /** @param {Choice | null} draft */

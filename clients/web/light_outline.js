@@ -67,11 +67,12 @@ export function draw_light(context, light, camera, colour) {
   const at = place[2] >= near ? pixel(place) : null;
   const ink = ink_of(context, colour);
   const tip = add(light.position, scale(subtract(light.target, light.position), ARROW_SHARE));
-  ink.arrow(line([light.position, tip], false));
+  const arrow = line([light.position, tip], false);
+  ink.arrow(arrow);
   ink.outline(line(outline_of(light, axes), true));
-  const inside = at && at[0] >= 0 && at[0] <= width && at[1] >= 0 && at[1] <= height;
-  if (inside) ink.dot(at);
-  else ink.mark(at ? [at[0] - width / 2, at[1] - height / 2] : [place[0], -place[1]]);
+  const inside = (/** @type {Pixel | null | undefined} */ point) => point && point[0] >= 0 && point[0] <= width && point[1] >= 0 && point[1] <= height;
+  if (at && inside(at)) ink.dot(at);
+  else if (!inside(arrow.at(-1))) ink.mark(at ? [at[0] - width / 2, at[1] - height / 2] : [place[0], -place[1]]);
 }
 
 /** Lines that are seen on black and on white. @param {CanvasRenderingContext2D} context @param {string} colour */

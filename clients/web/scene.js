@@ -10,7 +10,7 @@ import { light_json } from "./light.js";
 /** @typedef {import("./client.js").Files} Files */
 /** The part of space that the light is moved in: a square of half side `reach` about `middle`, seen from above, and heights.
  * @typedef {{middle: Vec3, reach: number, low: number, high: number}} Room */
-/** What stands in for a large image while the light moves: the same depth at fewer pixels.
+/** What stands in while the light moves and the whole is too slow: the same at fewer pixels.
  * @typedef {{size: [number, number], objects: Json[], occluders: Json, receivers: Json, files: Files}} Small */
 /** `fixed_light` says why only the light's size can change; empty when the light moves freely. `lights` are the kinds that the source allows,
  * `suggested` the settings that suit it, for techniques that have such a key. `technique` is the kind that suits it ("": the page's first), and
@@ -24,8 +24,9 @@ const EVERY_LIGHT = ["rectangle", "sphere", "directional", "point"];
 
 /** @returns {Source} */
 export function courtyard_source() {
+  const objects = courtyard(), files = new Map();
   return {
-    kind: "courtyard", title: "Courtyard", objects: courtyard(), files: new Map(),
+    kind: "courtyard", title: "Courtyard", objects, files,
     occluders: { resolution: [384, 384] }, receivers: { camera: courtyard_view, resolution: [512, 512] },
     room: { middle: [0, 0, 1], reach: 7, low: 1, high: 11 },
     light: {
@@ -33,7 +34,8 @@ export function courtyard_source() {
       width: 0.9, length: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
     fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
-    technique: "", settings: {}, drafts: [], stand_ins: ["soft_shadow_volume", "shadow_map"], picture: null, small: null,
+    technique: "", settings: {}, drafts: [], stand_ins: ["soft_shadow_volume", "shadow_map"], picture: null,
+    small: { size: [256, 256], objects, occluders: { resolution: [192, 192] }, receivers: { camera: courtyard_view, resolution: [256, 256] }, files },
   };
 }
 

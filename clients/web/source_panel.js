@@ -212,18 +212,18 @@ export class SourcePanel {
       if (wanted === this.#wanted) this.page.use(source);
     } catch (error) {
       if (wanted !== this.#wanted) return;
-      this.#offer_channels(error);
-      this.page.failed(error);
+      this.page.failed(this.#offer_channels(error));
     }
   }
 
-  /** Where the service says that it may be one of several channels, they are there to choose from. @param {unknown} error */
+  /** Where the service says that it may be one of several channels, they are there to choose from, and the error says so. @param {unknown} error */
   #offer_channels(error) {
     const channels = channels_in(error instanceof Error ? error.message : "");
-    if (channels.length === 0) return;
+    if (channels.length === 0) return error;
     this.channels = channels;
     this.show();
     /** @type {HTMLElement | null} */ (this.place.querySelector("[name=channel]"))?.focus();
+    return new Error(`${/** @type {Error} */ (error).message}. Choose it under Scene, Channel.`);
   }
 
   /** @param {Role} role @param {string} what @returns {File} */

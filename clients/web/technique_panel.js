@@ -53,12 +53,11 @@ const TRACED = ["depth_trace", "ray_traced"];
 /** What makes a draft quick, for techniques that have such a key. @type {Json} */
 const DRAFTED = { resolution: 96 };
 
-/** What may stand in while the light moves: for a traced technique the first of the source's drafts that takes the light; for another on a
- * large image itself, on the small one.
- * @param {Technique[]} techniques @param {Choice} choice @param {{drafts: string[], suggested: Json, small: unknown}} source
- * @param {string} light its kind @returns {Choice | null} */
+/** The quick technique that may stand in for a traced one while the light moves: the first of the source's drafts that takes the light.
+ * @param {Technique[]} techniques @param {Choice} choice @param {{drafts: string[], suggested: Json}} source @param {string} light its kind
+ * @returns {Choice | null} */
 export function draft_of(techniques, choice, source, light) {
-  if (!TRACED.includes(choice.kind)) return source.small ? choice : null;
+  if (!TRACED.includes(choice.kind)) return null;
   const kind = source.drafts.find((one) => techniques.some((known) => known.kind === one && known.lights.includes(light)));
   if (!kind) return null;
   const keys = techniques.find((one) => one.kind === kind)?.schema.properties ?? {};

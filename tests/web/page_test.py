@@ -648,9 +648,10 @@ class Relit(PageTest):
         self.wait_for_trace()
         self.assertEqual(self.mask()["size"], [1280, 720])
         self.assertEqual(self.scene_file()["receivers"]["depth"], "receiver.exr")
-        # A technique that is no trace has itself as a draft.
+        # A technique that is no trace, and does not keep pace, has itself as a draft.
+        self.delay("soft_shadow_map", 0.2)
         self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_map"))
-        self.delay("soft_shadow_map", 0.5)
+        self.assertEqual(self.mask()["size"], [1280, 720])
         self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
         self.assertEqual(self.mask()["size"], [512, 288])
         self.wait_for("return document.getElementById('mask').width === 1280")
@@ -661,6 +662,8 @@ class Relit(PageTest):
         self.wait_for("return document.querySelector('[name=channel]')")
         listed = Select(self.find("[name=channel]"))
         texts = [one.text for one in listed.options]
+        self.assertIn("Choose it under Scene, Channel.", self.problem())
+        self.assertEqual(self.js("return document.activeElement.name"), "channel")
         self.change(lambda: listed.select_by_visible_text(label))
         self.assertEqual(self.problem(), "")
         self.assertEqual(Select(self.find("[name=channel]")).first_selected_option.text, label)
