@@ -9,8 +9,9 @@ import { LatestQueue } from "./queue.js";
 /** @typedef {import("./technique_panel.js").Choice} Choice */
 /** @typedef {import("./client.js").MaskReply} MaskReply */
 /** What a mask is of, beside the light's place. @typedef {{choice: Choice, source: Source, light: string}} Of */
-/** @typedef {{source: Source, light: string, a: Choice, b: Choice, draft: Choice | null, stand_in: Choice | null, comparing: boolean}} State
- *   `draft`: what is seen in A's place while the light moves; `stand_in`: what is where A turns out to be slow */
+/** @typedef {{source: Source, light: string, a: Choice, b: Choice, draft: Choice | null, stand_in: Choice | null, comparing: boolean, eased: boolean}} State
+ *   `draft`: what is seen in A's place while the light moves; `stand_in`: what is where A turns out to be slow;
+ *   `eased`: A has a coarse map, as the light touches a caster */
 
 /** The second mask follows the light at once when it takes less than this; else, as a mask that was drafted, when the light has rested that
  * long. */
@@ -94,16 +95,14 @@ export class Follower {
   /** Asks for masks of the state as it is now. @param {boolean} [light_moved] whether the light alone has changed, or all is new: a draft does first */
   update(light_moved = false) {
     this.version++;
-    const { comparing, b, source, light, draft: possible } = this.page.state();
-    const draft = this.#draft();
+    const { b, source, light, draft } = this.page.state();
     const { b_of } = this.shown;
     if (b_of && !same(b_of, { choice: b, source, light })) this.#drop_b();
-    if (draft && !light_moved) this.#slow_queue.push(() => this.#update_a(null));
-    else this.#queue.push(() => (draft ? this.#update_a(draft) : this.#update_patiently()));
+    if (this.#draft() && !light_moved) this.#slow_queue.push(() => this.#update_a(null));
+    else this.#queue.push(() => this.#follow());
     clearTimeout(this.#rest_timer);
-    if (!comparing && !draft) return;
     const asked = this.version;
-    const rest_ms = draft && possible && source.small ? LARGE_RESTS_MS : FOLLOWS_MS;
+    const rest_ms = draft && source.small ? LARGE_RESTS_MS : FOLLOWS_MS;
     const when_rested = () => {
       if (asked !== this.version) return;
       if (this.#queue.busy) this.#rest_timer = setTimeout(when_rested, rest_ms);
@@ -142,17 +141,19 @@ export class Follower {
     }
   }
 
-  /** A in full; where that takes long, what is quick stands in. */
-  async #update_patiently() {
+  /** A, or what is asked for in its place by what is known of its time now; where that takes long, what is quicker stands in. */
+  async #follow() {
     const asked = this.version;
     const { stand_in, source, a } = this.page.state();
-    const full = this.#update_a(null);
+    const draft = this.#draft();
+    const quick = stand_in ?? (draft ? null : source.small && a);
+    const job = this.#update_a(draft);
+    if (!quick || draft?.kind === quick.kind) return job;
     const patience = new Promise((then) => setTimeout(() => then("over"), PATIENCE_MS));
-    const quick = stand_in ?? (source.small && a);
-    if (!quick || (await Promise.race([full, patience])) !== "over" || this.outage.waiting) return full;
+    if ((await Promise.race([job, patience])) !== "over" || this.outage.waiting) return job;
     this.#taken_ms.full = 2 * PATIENCE_MS;
     // One slow mask at a time: it may go on for long where the light has moved on.
-    this.#slow_queue.push(() => full);
+    this.#slow_queue.push(() => job);
     if (asked === this.version) await this.#update_a(quick);
   }
 
@@ -168,7 +169,7 @@ export class Follower {
       if (this.#too_late(asked, shown.a_version)) return;
       // What it stands in for is there already.
       if (draft && shown.a_version === asked && !shown.draft && !shown.refused) return;
-      this.#taken_ms[draft ? "draft" : "full"] = reply.ms;
+      if (JSON.stringify(a) === JSON.stringify(this.page.state().a)) this.#taken_ms[draft ? "draft" : "full"] = reply.ms;
       this.view.a = mask;
       Object.assign(shown, { a: reply, a_version: asked, a_of: { choice, source, light }, draft: draft !== null, refused: false });
       this.page.came("a", choice);

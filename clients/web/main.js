@@ -2,6 +2,7 @@
 // The page: one state, the panels that change it, and the masks that follow it.
 import { Busy } from "./busy.js";
 import { Client, ServiceError } from "./client.js";
+import { eased } from "./crowding.js";
 import { depth_view } from "./depth_view.js";
 import { choice_field } from "./fields.js";
 import { Follower } from "./follower.js";
@@ -72,7 +73,8 @@ const outage = new Outage((text) => {
 const draft_choice = () => (by_id("draft").checked ? draft_of(techniques, a, source, light.kind) : null);
 
 const state = () => ({
-  source, light: light.kind, a, b, comparing: view.mode !== "mask",
+  source, light: light.kind, comparing: view.mode !== "mask",
+  a: eased(a, light, source.objects), b: eased(b, light, source.objects), eased: eased(a, light, source.objects) !== a,
   draft: draft_choice(), stand_in: stand_in_of(techniques, a, source, light.kind),
 });
 

@@ -49,7 +49,7 @@ export class Stage {
   /** Which mask this is, and whether it is that of what is asked for. */
   show_names() {
     const { follower: { shown, stale, version }, view } = this;
-    const { a, b, draft } = this.page.state();
+    const { b, draft, eased } = this.page.state();
     const comparing = view.mode !== "mask";
     const stale_b = shown.b_version !== version;
     const frame = by_id("frame");
@@ -57,7 +57,7 @@ export class Stage {
     frame.classList.toggle("other", stale.other || shown.refused);
     frame.classList.toggle("stale_b", view.mode === "wipe" && shown.b !== null && stale_b);
     const earlier = stale.other && shown.a !== null;
-    by_id("name_a").hidden = !comparing && draft === null && !shown.draft && !earlier;
+    by_id("name_a").hidden = !comparing && draft === null && !shown.draft && !earlier && !eased;
     by_id("name_a").textContent = `${comparing ? "A  " : ""}${this.#name_of_a(earlier)}`;
     by_id("name_b").hidden = !comparing;
     by_id("name_b").textContent = `B  ${b.kind}${shown.b === null ? ": to come" : stale_b ? ": earlier" : ""}`;
@@ -66,13 +66,14 @@ export class Stage {
   /** @param {boolean} earlier */
   #name_of_a(earlier) {
     const { shown } = this.follower;
-    const { a } = this.page.state();
+    const { a, eased } = this.page.state();
     const kind = shown.a_of?.choice.kind ?? a.kind;
     if (earlier) return `${kind}: earlier`;
     const small = shown.a_of?.source.small;
     const size = small ? ` at ${small.size.join(" x ")}` : "";
     const full = kind === a.kind ? "in full" : a.kind;
-    return shown.draft ? `${kind}: draft${size}; ${full} when the light rests` : kind;
+    if (shown.draft) return `${kind}: draft${size}; ${full} when the light rests`;
+    return eased ? `${kind} with a map of ${a.settings.resolution} x ${a.settings.resolution}: the light touches a caster` : kind;
   }
 
   /** With the browser's next frame, and not with every one: the service may need the same processor. */

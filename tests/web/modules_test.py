@@ -182,6 +182,24 @@ class Modules(PageTest):
         self.assertEqual(got[2], [{"channel": "a.Z"}, {"channel": "b.Z"}])
         self.assertEqual(got[3:], [[], []])
 
+    def test_a_light_is_crowded_where_a_caster_is_nearer_than_its_corners(self):
+        got = self.module(
+            """
+            const {distance_to, is_crowded, eased} = await page("crowding");
+            const quad = {center: [0, 0, 0], half_u: [2, 0, 0], half_v: [0, 0, -1]};
+            const light = (x, y, z) => ({kind: "rectangle", position: [x, y, z], target: [0, 0, 0], width: 0.6, length: 0.8, radius: 0, angular_diameter_deg: 0});
+            const near = light(0, 0.4, 0), objects = [{quad}], of = (kind, resolution) => eased({kind, settings: {resolution}}, near, objects).settings.resolution;
+            return {
+                distances: [[0, 3, 0], [2, 0, 1], [5, 4, 0], [1, 0, -3]].map((point) => distance_to(point, quad)),
+                crowded: [is_crowded(near, objects), is_crowded(light(0, 0.6, 0), objects), is_crowded(near, [{quad, casts: false}]), is_crowded({...near, kind: "point"}, objects)],
+                map: [of("soft_shadow_map", 0), of("soft_shadow_map", 512), of("soft_shadow_map", 32), of("smoothie", 512)],
+            };
+            """
+        )
+        self.assertEqual(got["distances"], [3, 0, 5, 2])
+        self.assertEqual(got["crowded"], [True, False, False, False])  # the corners are 0.5 from the middle
+        self.assertEqual(got["map"], [48, 48, 32, 512])
+
     def test_a_line_is_cut_where_the_camera_stands(self):
         got = self.module(
             """
