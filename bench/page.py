@@ -48,7 +48,7 @@ class Bench(PageTest):
             self.change(lambda: self.drop(path))
             self.wait_for("return document.getElementById('mask').dataset.technique === 'depth_trace' || !document.getElementById('problem').hidden")
             first, full = self.js("return [window.came[0], performance.now()].map((ms) => (ms - window.dropped) / 1000)")
-            self.row("one camera's depth", f"{width} x {height}", f"{first:.1f}", self.problem() or f"{full:.1f}", self.rate(), self.load())
+            self.row("one camera's depth", f"{width} x {height}", f"{first:.1f}", f"none: {self.problem()}" if self.problem() else f"{full:.1f}", self.rate(), self.load())
 
     def pass_of(self, width, height):
         """A depth pass of that size, rendered from the example's scene."""
