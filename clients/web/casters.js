@@ -1,17 +1,21 @@
 // @ts-check
 // A drawing of what casts the shadow, over the mask: the mask itself shows receivers only.
-import { cross, dot, normalized, subtract } from "./vector.js";
+import { cross, dot, length, normalized, subtract } from "./vector.js";
 
 /** @typedef {import("./vector.js").Vec3} Vec3 */
 /** @typedef {import("./client.js").Json} Json */
 
+/** A pinhole camera's axes, and the tangent of half its field of view. @param {Json} camera */
+export function camera_axes(camera) {
+  const forward = normalized(subtract(camera.target, camera.eye));
+  const right = normalized(cross(forward, camera.up));
+  return { forward, right, up: cross(right, forward), tangent: Math.tan((camera.vertical_fov_deg * Math.PI) / 360) };
+}
+
 /** Image coordinates, 0 to 1 from the upper left corner, of points before a pinhole camera.
  * @param {Json} camera @param {number} aspect width over height */
 export function projection(camera, aspect) {
-  const forward = normalized(subtract(camera.target, camera.eye));
-  const right = normalized(cross(forward, camera.up));
-  const up = cross(right, forward);
-  const tangent = Math.tan((camera.vertical_fov_deg * Math.PI) / 360);
+  const { forward, right, up, tangent } = camera_axes(camera);
   return (/** @type {Vec3} */ point) => {
     const along = subtract(point, camera.eye);
     const depth = dot(along, forward);
@@ -33,7 +37,9 @@ export function draw_casters(context, objects, camera, light) {
       project(/** @type {Vec3} */ (quad.center.map((/** @type {number} */ c, /** @type {number} */ i) => c + s * quad.half_u[i] + t * quad.half_v[i]))),
     );
     if (corners.some((corner) => corner.depth <= 0)) continue;
-    const facing = Math.max(0, dot(normal, normalized(subtract(light, quad.center))));
+    // A light in the middle of a side has no direction to it.
+    const along = subtract(light, quad.center);
+    const facing = Math.max(0, dot(normal, along)) / (length(along) || 1);
     faces.push({ corners, facing, depth: corners.reduce((sum, corner) => sum + corner.depth, 0) });
   }
   faces.sort((a, b) => b.depth - a.depth);

@@ -22,9 +22,22 @@ export class ServiceError extends Error {
   }
 }
 
+/** No answer at all: the service does not run, or the way to it is broken. */
+export class NoAnswer extends Error {
+  constructor() {
+    super("the service does not answer");
+  }
+}
+
+/** What fails on its way. @template T @param {Promise<T>} answer */
+const answered = (answer) =>
+  answer.catch((error) => {
+    throw error instanceof TypeError ? new NoAnswer() : error;
+  });
+
 /** @param {Response} response */
 async function error_of(response) {
-  const text = await response.text();
+  const text = await answered(response.text());
   /** @type {Json} */
   let problem = {};
   try {
@@ -33,7 +46,7 @@ async function error_of(response) {
     // Not the service's own answer: a proxy's page, say.
   }
   const detail = problem.detail ?? `the answer is ${response.status} ${response.statusText}`;
-  return new ServiceError(response.status, detail, problem.reason ?? "", Number(response.headers.get("Retry-After") ?? 0));
+  return new ServiceError(response.status, detail, problem.reason ?? "", Number(response.headers.get("Retry-After")) || 0);
 }
 
 /** @param {string | null} header @returns {Stage[]} */
@@ -82,7 +95,7 @@ export class Client {
   async #fetch(path, init = {}) {
     const headers = new Headers(init.headers);
     if (this.token) headers.set("Authorization", `Bearer ${this.token}`);
-    const response = await fetch(path, { ...init, headers, cache: "no-store" });
+    const response = await answered(fetch(path, { ...init, headers, cache: "no-store" }));
     if (!response.ok) throw await error_of(response);
     return response;
   }
@@ -96,6 +109,14 @@ export class Client {
   async device() {
     const { version, devices } = await (await this.#fetch("/v1/devices")).json();
     return { version, device: devices.find((/** @type {Json} */ d) => d.selected)?.name ?? "" };
+  }
+
+  /** The depth of a scene's receivers as a float map, no side longer than `side`, and the size of the image itself.
+   * @param {Json} scene @param {Files} files @param {number} side @returns {Promise<{buffer: ArrayBuffer, size: [number, number]}>} */
+  async depth(scene, files, side) {
+    const response = await this.#fetch(`/v1/depth?side=${side}`, { method: "POST", body: form_of(scene, files) });
+    const [width, height] = (response.headers.get("Penumbra-Size") ?? "").split("x").map(Number);
+    return { buffer: await answered(response.arrayBuffer()), size: [width, height] };
   }
 
   /** The mask of a scene that more requests will follow of.
@@ -115,7 +136,7 @@ export class Client {
   async #timed(post) {
     let begun = performance.now();
     const response = await post(() => (begun = performance.now()));
-    const buffer = await response.arrayBuffer();
+    const buffer = await answered(response.arrayBuffer());
     return {
       buffer,
       stages: stages_of(response.headers.get("Server-Timing")),

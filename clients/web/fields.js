@@ -15,6 +15,9 @@ export function element(tag, properties = {}, ...children) {
   return node;
 }
 
+/** A text of the service or the page: what stands between backticks is code. @param {string} text @returns {(Node | string)[]} */
+export const prose = (text) => text.split("`").map((piece, i) => (i % 2 === 1 ? element("code", {}, piece) : piece));
+
 /** A label, a control and, where there is one, a help text that screen readers read with it.
  * @param {string} label @param {HTMLElement} control @param {{help?: string, unit?: string}} texts @param {...Node} more */
 function row(label, control, { help = "", unit = "" }, ...more) {
@@ -22,7 +25,7 @@ function row(label, control, { help = "", unit = "" }, ...more) {
   const units = unit ? [element("span", { className: "unit" }, ` ${unit}`)] : [];
   const parts = [element("label", { htmlFor: control.id }, label, ...units), element("div", { className: "control" }, control, ...more)];
   if (help) {
-    const text = element("p", { className: "help", id: `${control.id}_help` }, help);
+    const text = element("p", { className: "help", id: `${control.id}_help` }, ...prose(help));
     control.setAttribute("aria-describedby", text.id);
     parts.push(text);
   }

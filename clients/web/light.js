@@ -4,11 +4,11 @@ import { cross, length, normalized, scale, subtract } from "./vector.js";
 
 /** @typedef {import("./vector.js").Vec3} Vec3 */
 /** `position` to `target` is where it shines; a directional light has only that direction. Sizes are whole, not halves.
- * @typedef {{kind: string, position: Vec3, target: Vec3, width: number, height: number, radius: number, angular_diameter_deg: number}} Light */
+ * @typedef {{kind: string, position: Vec3, target: Vec3, width: number, length: number, radius: number, angular_diameter_deg: number}} Light */
 
 /** Kinds and the sizes that each has. @type {Record<string, {label: string, sizes: (keyof Light)[]}>} */
 export const LIGHT_KINDS = {
-  rectangle: { label: "Rectangle", sizes: ["width", "height"] },
+  rectangle: { label: "Rectangle", sizes: ["width", "length"] },
   sphere: { label: "Sphere", sizes: ["radius"] },
   directional: { label: "Directional (sun)", sizes: ["angular_diameter_deg"] },
   point: { label: "Point", sizes: [] },
@@ -45,7 +45,7 @@ export function light_json(light) {
   switch (light.kind) {
     case "rectangle": {
       const { u, v } = axes_of(direction);
-      return { kind: "rectangle", center, half_u: written(scale(u, light.width / 2)), half_v: written(scale(v, light.height / 2)) };
+      return { kind: "rectangle", center, half_u: written(scale(u, light.width / 2)), half_v: written(scale(v, light.length / 2)) };
     }
     case "sphere":
       return { kind: "sphere", center, radius: light.radius, direction: written(direction) };

@@ -139,7 +139,7 @@ export class LightPad {
     context.setLineDash([]);
     context.fillStyle = colour("--accent");
     context.globalAlpha = 0.3;
-    const half = light.kind === "rectangle" ? [scale(u, light.width / 2), scale(v, light.height / 2)] : null;
+    const half = light.kind === "rectangle" ? [scale(u, light.width / 2), scale(v, light.length / 2)] : null;
     if (half) {
       const corner = (/** @type {number} */ s, /** @type {number} */ t) => /** @type {Vec3} */ (light.position.map((c, i) => c + s * half[0][i] + t * half[1][i]));
       line([corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)]);

@@ -8,7 +8,7 @@ import { LightPad } from "./light_pad.js";
 /** @typedef {import("./light.js").Light} Light */
 /** @typedef {import("./scene.js").Source} Source */
 
-const SIZE_LABELS = { width: "Width", height: "Height", radius: "Radius", angular_diameter_deg: "Angular diameter" };
+const SIZE_LABELS = { width: "Width", length: "Length", radius: "Radius", angular_diameter_deg: "Angular diameter" };
 
 export class LightPanel {
   /** @type {((light: Light) => void)[]} what follows the light's position */
@@ -36,9 +36,10 @@ export class LightPanel {
         /** @type {HTMLElement | null} */ (this.place.querySelector("select"))?.focus();
       },
     );
-    this.place.replaceChildren(kinds.node, ...this.#sizes(source, light));
-    if (source.fixed_light) this.place.append(element("p", { className: "notice", id: "fixed_light" }, source.fixed_light));
-    else this.place.append(...this.#movement(source, light));
+    const fixed = element("p", { className: "notice", id: "fixed_light" }, source.fixed_light);
+    const movement = source.fixed_light ? [fixed] : this.#movement(source, light);
+    // What moves it comes first: it is in sight beside the picture, on a tablet as well.
+    this.place.replaceChildren(...movement, kinds.node, ...this.#sizes(source, light), ...(source.fixed_light ? [] : [this.#numbers(light)]));
     this.pad.show(source, light);
   }
 
@@ -86,9 +87,13 @@ export class LightPanel {
     const caption = light.kind === "directional" ? "Seen from above; only the direction to the aim counts." : "Seen from above. Drag, or use the arrow keys.";
     return [
       element("div", { className: "pad_row" }, this.canvas, element("div", { className: "height" }, height, element("span", { className: "help" }, "height"))),
-      element("p", { className: "help" }, caption),
-      element("details", {}, element("summary", {}, "Numbers"), this.#triple("Position", "position", light), this.#triple("Aim", "target", light)),
+      element("p", { className: "help pad_help" }, caption),
     ];
+  }
+
+  /** @param {Light} light */
+  #numbers(light) {
+    return element("details", {}, element("summary", {}, "Numbers"), this.#triple("Position", "position", light), this.#triple("Aim", "target", light));
   }
 
   /** @param {string} title @param {"position" | "target"} key @param {Light} light */

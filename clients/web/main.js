@@ -1,45 +1,36 @@
 // @ts-check
-// The page: one state, a queue of requests that follows it and one for slow masks, and the panels that change the state and show the masks.
-import { draw_casters } from "./casters.js";
+// The page: one state, the panels that change it, and the masks that follow it.
+import { Busy } from "./busy.js";
 import { Client, ServiceError } from "./client.js";
+import { eased } from "./crowding.js";
+import { depth_view } from "./depth_view.js";
 import { choice_field } from "./fields.js";
-import { error_table, stage_table } from "./figures.js";
+import { Follower } from "./follower.js";
 import { LightPanel } from "./light_panel.js";
-import { compare } from "./metrics.js";
-import { decode_pfm } from "./pfm.js";
 import { Orbit } from "./orbit.js";
-import { choose_picture, show_picture_choice } from "./picture_choice.js";
-import { median_depth } from "./probe.js";
-import { LatestQueue } from "./queue.js";
+import { Outage } from "./outage.js";
+import { choose_picture } from "./picture_choice.js";
 import { RateMeter } from "./rate.js";
 import { courtyard_source, scene_json } from "./scene.js";
 import { save, SharePanel } from "./share_panel.js";
 import { SourcePanel } from "./source_panel.js";
-import { draft_of, suggested_choice, technique_panel } from "./technique_panel.js";
+import { Stage } from "./stage.js";
+import { draft_of, stand_in_of, suggested_choice, technique_panel } from "./technique_panel.js";
 import { View } from "./view.js";
 import { wire_wipe } from "./wipe.js";
 
 /** @typedef {import("./scene.js").Source} Source */
 /** @typedef {import("./technique_panel.js").Choice} Choice */
-/** @typedef {import("./client.js").MaskReply} MaskReply */
 
 const PFM = "image/x-portable-floatmap";
 /** What the page opens with, where the service knows it; else the service's first. */
 const FIRST = { a: "soft_shadow_map", b: "ray_traced" };
-/** The second mask follows the light at once when it takes less than this; else, as a mask that was drafted, when the light has rested that
- * long. */
-const FOLLOWS_MS = 150;
-/** Tables follow a moving light this often: nobody reads them faster. */
-const FIGURES_MS = 250;
 /** How long a message stays. */
 const SAID_MS = 4000;
 
 const by_id = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
 const client = new Client();
-const queue = new LatestQueue();
-/** What takes long, while a draft or a first mask is shown: a light that moves again does not wait for it. */
-const slow_queue = new LatestQueue();
 const view = new View(by_id("mask"));
 const rate = new RateMeter();
 /** @type {import("./client.js").Technique[]} */
@@ -51,14 +42,6 @@ let light = source.light;
 let a = { kind: FIRST.a, settings: {} };
 /** @type {Choice} */
 let b = { kind: FIRST.b, settings: {} };
-/** Counts changes: a mask belongs to one. */
-let version = 0;
-/** `draft` is the technique that stands in for A's. @type {{a: MaskReply | null, a_version: number, draft: Choice | null, b: MaskReply | null, b_version: number}} */
-const shown = { a: null, a_version: -1, draft: null, b: null, b_version: -1 };
-/** How long the last draft and the last mask in full took, from asking for them to the last byte. */
-const taken_ms = { draft: 0, full: Infinity };
-let rest_timer = 0, figures_timer = 0;
-
 let said_timer = 0;
 
 /** @param {string} text */
@@ -68,124 +51,88 @@ function say(text) {
   said_timer = setTimeout(() => (by_id("said").textContent = ""), SAID_MS);
 }
 
-/** @param {unknown} error @param {string} [whose] */
-function fail(error, whose = "") {
+/** @param {unknown} error @param {string} [whose] @param {boolean} [kept] the last mask stays in sight: no reason for alarm */
+function fail(error, whose = "", kept = false) {
   if (error instanceof ServiceError && error.status === 401) {
     by_id("token_form").hidden = false;
     by_id("token").focus();
   }
   const box = by_id("problem");
-  box.textContent = `${whose}${error instanceof Error ? error.message : String(error)}`;
+  box.textContent = `${kept && !whose ? "No mask here: " : whose}${error instanceof Error ? error.message : String(error)}`;
+  box.classList.toggle("calm", kept);
+  box.setAttribute("role", kept ? "status" : "alert");
   box.hidden = false;
 }
 
-/** @param {Choice} choice @returns {Promise<MaskReply>} */
-const ask = (choice) => client.mask(scene_json(source, light, choice), source.files, PFM);
-
-/** True when the service was busy and the job will be tried again. @param {unknown} error @param {() => void} again */
-function waits(error, again) {
-  if (!(error instanceof ServiceError && error.status === 503)) return false;
-  setTimeout(again, 1000 * Math.max(1, error.retry_after_s));
-  return true;
-}
+const outage = new Outage((text) => {
+  by_id("outage").textContent = text;
+  by_id("outage").hidden = text === "";
+});
 
 /** The technique that may stand in for A's while the light moves; null: A's own does. */
 const draft_choice = () => (by_id("draft").checked ? draft_of(techniques, a, source, light.kind) : null);
-/** That technique, unless A's own is as quick here. */
-const draft_now = () => (taken_ms.full > taken_ms.draft ? draft_choice() : null);
 
-/** @param {Choice | null} draft */
-async function update_a(draft) {
-  const asked = version;
-  const choice = draft ?? a;
+const state = () => ({
+  source, light: light.kind, comparing: view.mode !== "mask",
+  a: eased(a, light, source.objects), b: eased(b, light, source.objects), eased: eased(a, light, source.objects) !== a,
+  draft: draft_choice(), stand_in: stand_in_of(techniques, a, source, light.kind),
+});
+
+const busy = new Busy(by_id("busy"));
+
+/** What is asked for once, and again where the service does not answer. @template T @param {string} name @param {() => Promise<T>} ask
+ * @returns {Promise<T>} */
+async function steadily(name, ask) {
+  const end = busy.begin(name);
   try {
-    const reply = await ask(choice);
-    // The light has gone on, and its draft is there already.
-    if (shown.a_version > asked) return;
-    taken_ms[draft ? "draft" : "full"] = reply.ms;
-    view.a = decode_pfm(reply.buffer);
-    Object.assign(shown, { a: reply, a_version: asked, draft });
+    const answer = await ask();
+    outage.over();
+    return answer;
+  } catch (error) {
+    if (!Outage.is(error)) throw error;
+    await outage.wait(error);
+  } finally {
+    end();
+  }
+  return steadily(name, ask);
+}
+
+const follower = new Follower(view, outage, busy, {
+  state,
+  ask: (choice, draft) => {
+    const lit = draft && source.small ? { ...source, ...source.small } : source;
+    return client.mask(scene_json(lit, light, choice), lit.files, PFM);
+  },
+  show: () => {
+    stage.show();
+    // The lines to copy depend on the size of the mask that it lies under.
+    if (source.picture) share.refresh();
+  },
+  came: (whose, choice) => {
+    if (whose === "b") {
+      by_id("mask").dataset.versionB = String(follower.shown.b_version);
+      return;
+    }
     by_id("problem").hidden = true;
     by_id("rate").textContent = rate.tick(performance.now());
     // Announced to scripts and tests: this version of the state is on the screen, as a draft or in full.
-    by_id("mask").dataset.version = String(asked);
+    by_id("mask").dataset.version = String(follower.shown.a_version);
     by_id("mask").dataset.technique = choice.kind;
-  } catch (error) {
-    if (shown.a_version > asked) return;
-    if (waits(error, () => update(draft !== null))) return;
-    // A draft stays in sight: it is right for what it is.
-    const drafted = !draft && shown.draft !== null;
-    Object.assign(shown, drafted ? { a_version: asked } : { a: null, a_version: asked, draft });
-    fail(error, drafted ? `${choice.kind}: ` : "");
-  }
-  show_masks();
-  if (!draft && view.mode !== "mask" && shown.b && shown.b.ms < FOLLOWS_MS && asked === version) await update_b();
-}
+  },
+  failed: (error, whose, kept) => {
+    by_id("mask").dataset.refused = String(follower.shown.a_version);
+    fail(error, whose, kept);
+  },
+});
+const stage = new Stage(view, follower, { state, light: () => light });
 
-async function update_b() {
-  const asked = version;
-  try {
-    const reply = await ask(b);
-    if (shown.b_version > asked) return;
-    view.b = decode_pfm(reply.buffer);
-    shown.b = reply;
-    shown.b_version = asked;
-    by_id("mask").dataset.versionB = String(asked);
-  } catch (error) {
-    if (waits(error, () => update())) return;
-    view.b = null;
-    shown.b = null;
-    fail(error, `${b.kind}: `);
-  }
-  show_masks();
-}
-
-/** What is missing when the light rests: A in full, and B. @param {number} asked the version that rested */
-async function complete(asked) {
-  if (asked !== version) return;
-  if (shown.draft || shown.a_version !== version) await update_a(null);
-  // Without a first mask there is nothing to compare with, and its error is what the user should read.
-  if (view.mode !== "mask" && asked === version && shown.b_version !== version && shown.a) await update_b();
-}
-
-/** Asks for masks of the state as it is now. @param {boolean} [light_moved] whether the light alone has changed, or all is new: a draft does first */
+/** @param {boolean} [light_moved] */
 function update(light_moved = false) {
-  version++;
-  const draft = draft_now();
-  if (draft && !light_moved) slow_queue.push(() => update_a(null));
-  else queue.push(() => update_a(draft));
+  follower.update(light_moved);
+  by_id("mask").dataset.asked = String(follower.version);
+  stage.show_names();
+  stage.show_overlay();
   share.refresh();
-  clearTimeout(rest_timer);
-  if (view.mode === "mask" && !draft) return;
-  const asked = version;
-  const when_rested = () => {
-    if (asked !== version) return;
-    if (queue.busy) rest_timer = setTimeout(when_rested, FOLLOWS_MS);
-    else slow_queue.push(() => complete(asked));
-  };
-  rest_timer = setTimeout(when_rested, FOLLOWS_MS);
-}
-
-function show_masks() {
-  view.draw();
-  const frame = by_id("frame");
-  if (view.a) frame.parentElement.style.setProperty("--aspect", String(view.a.width / view.a.height));
-  frame.style.setProperty("--wipe", String(view.wipe));
-  const comparing = view.mode !== "mask";
-  const stale = shown.b_version !== version;
-  frame.classList.toggle("failed", shown.a === null);
-  const drafted = shown.draft !== null;
-  by_id("name_b").hidden = !comparing;
-  by_id("name_a").hidden = !comparing && draft_choice() === null && !drafted;
-  by_id("name_a").textContent = `${comparing ? "A  " : ""}${(shown.draft ?? a).kind}${drafted ? `: draft; ${a.kind} when the light rests` : ""}`;
-  by_id("name_b").textContent = `B  ${b.kind}${shown.b === null ? ": to come" : stale ? ": earlier" : ""}`;
-  by_id("divider").hidden = by_id("wipe_row").hidden = view.mode !== "wipe";
-  by_id("legend").hidden = view.mode !== "difference";
-  show_picture_choice(view);
-  if (source.picture) share.refresh();
-  by_id("b_section").hidden = !comparing;
-  show_overlay();
-  figures_timer ||= setTimeout(show_figures, FIGURES_MS);
 }
 
 /** @param {import("./picture.js").Picture | null} picture */
@@ -193,32 +140,6 @@ function use_picture(picture) {
   source = { ...source, picture };
   choose_picture(view, picture);
   share.refresh();
-}
-
-function show_overlay() {
-  const overlay = by_id("overlay");
-  const ratio = devicePixelRatio || 1;
-  overlay.width = Math.max(1, Math.round(overlay.clientWidth * ratio));
-  overlay.height = Math.max(1, Math.round(overlay.clientHeight * ratio));
-  const drawable = source.objects.some((object) => object.quad);
-  by_id("casters_label").hidden = !drawable;
-  if (drawable && by_id("casters").checked && view.mode !== "difference")
-    draw_casters(overlay.getContext("2d"), source.objects, source.receivers.camera, light.position);
-}
-
-function show_figures() {
-  figures_timer = 0;
-  const fresh_b = view.mode !== "mask" && shown.b_version === version && !shown.draft;
-  const kind = shown.draft ? `${shown.draft.kind}, draft` : a.kind;
-  const tables = [];
-  if (fresh_b && view.a && view.b) {
-    if (view.comparable) tables.push(error_table(compare(view.a, view.b), a.kind, b.kind));
-  }
-  if (shown.a) tables.push(stage_table(view.mode === "mask" ? kind : `A  ${kind}`, shown.a.stages, shown.a.ms));
-  if (fresh_b && shown.b) tables.push(stage_table(`B  ${b.kind}`, shown.b.stages, shown.b.ms));
-  by_id("figures").replaceChildren(...tables);
-  const warnings = (shown.a?.warnings ?? []).map((text) => Object.assign(document.createElement("li"), { textContent: text }));
-  by_id("warnings").replaceChildren(...warnings);
 }
 
 const light_panel = new LightPanel(by_id("light"), (next) => {
@@ -238,17 +159,18 @@ function show_techniques() {
   });
   technique_panel(by_id("technique_b"), techniques, b, fits, (next) => {
     b = next;
-    shown.b = null;
     update();
   });
 }
 
 /** The switch of drafts, where there is one for A's technique. How long the two take is new. */
 function show_draft_choice() {
-  Object.assign(taken_ms, { draft: 0, full: Infinity });
+  follower.forget_times();
   const draft = draft_of(techniques, a, source, light.kind);
   by_id("draft_row").hidden = draft === null;
-  if (draft) by_id("draft_help").textContent = `${draft.kind} while the light moves, ${a.kind} when it rests, unless that is as quick.`;
+  if (!draft) return;
+  const size = source.small ? ` at ${source.small.size.join(" x ")}` : "";
+  by_id("draft_help").textContent = `${draft.kind}${size} while the light moves, ${a.kind} when it rests, unless that is as quick.`;
 }
 
 /** Sizes of what the service renders; given images have their own. */
@@ -270,7 +192,7 @@ function show_resolutions() {
 /** @param {Source} next */
 function use(next) {
   orbit.stop();
-  const other = next.kind !== source.kind;
+  const other = next.kind !== source.kind, last = source;
   source = next;
   // Another kind of source takes the technique that is its own.
   if (other) a = known(next.technique || FIRST.a, 0);
@@ -281,11 +203,12 @@ function use(next) {
   };
   a = suited(a);
   b = suited(b);
+  if (a.kind === next.technique) {
+    const chosen = Object.entries(a.settings).filter(([key, value]) => last.settings[key] !== value);
+    a = { kind: a.kind, settings: { ...next.settings, ...Object.fromEntries(chosen) } };
+  }
   light = next.light;
-  view.b = shown.b = null;
-  // Masks of the last source that are still on their way come too late.
-  shown.a_version = version + 1;
-  shown.b_version = version;
+  follower.forget_masks();
   use_picture(next.picture);
   by_id("orbit").disabled = next.fixed_light !== "";
   by_id("problem").hidden = true;
@@ -326,12 +249,9 @@ const source_panel = new SourcePanel(by_id("source"), {
   },
   use_picture: (picture) => {
     use_picture(picture);
-    show_masks();
+    stage.show();
   },
-  measure: (name, file, encoding, fov_deg) => {
-    say("Measuring how far the subject is");
-    return median_depth(client, name, file, encoding, fov_deg);
-  },
+  look: (name, file, encoding, fov_deg) => steadily(`reading ${name}`, () => depth_view(client, name, file, encoding, fov_deg)),
   failed: (error) => {
     say("");
     fail(error);
@@ -351,23 +271,22 @@ const orbit = new Orbit(by_id("orbit"), {
 function wire() {
   by_id("modes").addEventListener("change", (/** @type {any} */ event) => {
     view.mode = event.target.value;
-    show_masks();
+    stage.show();
+    stage.show_overlay();
     update();
   });
   by_id("tone").addEventListener("change", () => {
     view.tone = by_id("tone").value;
     view.draw();
   });
-  by_id("casters").addEventListener("change", show_overlay);
   by_id("shows").addEventListener("change", (/** @type {any} */ event) => {
     view.shows = event.target.value;
-    show_masks();
+    stage.show();
     share.refresh();
   });
   by_id("draft").addEventListener("change", () => update());
   wire_wipe(view, by_id("frame"), by_id("wipe"));
   const frame = by_id("frame");
-  new ResizeObserver(show_overlay).observe(frame);
 
   addEventListener("dragover", (event) => {
     event.preventDefault();
@@ -397,8 +316,8 @@ function known(wanted, otherwise) {
 
 async function begin() {
   try {
-    techniques = await client.techniques();
-    const { version: release, device } = await client.device();
+    techniques = await steadily("starting", () => client.techniques());
+    const { version: release, device } = await steadily("starting", () => client.device());
     by_id("device").textContent = `${device}, version ${release}`;
     by_id("problem").hidden = true;
     a = known(FIRST.a, 0);

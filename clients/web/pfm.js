@@ -49,3 +49,20 @@ export function decode_pfm(buffer) {
   for (let y = 0; y < height; y++) pixels.set(samples.subarray(y * row, (y + 1) * row), (height - 1 - y) * row);
   return { width, height, channels, pixels };
 }
+
+/** A grey one as a file. @param {FloatImage} image */
+export function encode_pfm({ width, height, pixels }) {
+  const rows = [];
+  for (let y = height - 1; y >= 0; y--) rows.push(pixels.slice(y * width, (y + 1) * width));
+  return new Blob([`Pf\n${width} ${height}\n${host_is_little ? -1 : 1}\n`, ...rows]);
+}
+
+/** Pixels of a grey image, so many apart that no side is longer than `side`: the one under the middle of each.
+ * @param {FloatImage} image @param {number} side @returns {FloatImage} */
+export function thinned({ width, height, pixels }, side) {
+  const longest = Math.max(width, height, side);
+  const [w, h] = [width, height].map((length) => Math.max(1, Math.floor((length * side) / longest)));
+  const place = (/** @type {number} */ i, /** @type {number} */ of, /** @type {number} */ among) => Math.floor(((2 * i + 1) * among) / (2 * of));
+  const kept = Float32Array.from({ length: w * h }, (_, i) => pixels[place(Math.floor(i / w), h, height) * width + place(i % w, w, width)]);
+  return { width: w, height: h, channels: 1, pixels: kept };
+}

@@ -44,6 +44,11 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 }
 
+/** Where it is another text: a light that moves changes few. @param {HTMLElement} node @param {string} text */
+function write(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
 /** @param {string} label @param {string} id @param {() => string} text @param {(said: string) => void} say */
 function copyable(label, id, text, say) {
   const area = element("pre", { id, tabIndex: 0 });
@@ -94,10 +99,10 @@ export class SharePanel {
     const { scene, files, bounds, picture } = this.page.state();
     this.bound.hidden = !bounds;
     this.picture.hidden = picture === null;
-    this.note.textContent = `The lines below take scene.json${files.size > 0 ? ` and, beside it, ${[...files.keys()].join(", ")}` : ""}.`;
-    this.curl.area.textContent = this.#curl();
-    this.penumbra.area.textContent = penumbra_line(picture);
+    write(this.note, `The lines below take scene.json${files.size > 0 ? ` and, beside it, ${[...files.keys()].join(", ")}` : ""}.`);
+    write(this.curl.area, this.#curl());
+    write(this.penumbra.area, penumbra_line(picture));
     // Long, so only while it is seen.
-    if (this.details.open) this.scene.area.textContent = scene_text(scene);
+    if (this.details.open) write(this.scene.area, scene_text(scene));
   }
 }

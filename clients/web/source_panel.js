@@ -1,5 +1,6 @@
 // @ts-check
 // What is lit: the bundled scene, or depth maps that are dropped or picked, one camera's with its picture.
+import { channel_label, channels_in } from "./channels.js";
 import { button, choice_field, element, flag_field, number_field } from "./fields.js";
 import { look_of, part_name, picture_among, roles_of } from "./files.js";
 import { Picture } from "./picture.js";
@@ -30,9 +31,13 @@ export class SourcePanel {
   fov_deg = 50;
   /** 0: measured. */
   distance = 0;
+  /** What the depth may be in, where the service is not certain. @type {import("./channels.js").Channel[]} */
+  channels = [];
+  /** Counts what was to be lit: the last one is. */
+  #wanted = 0;
 
   /** @param {HTMLElement} place
-   * @param {{use: (source: Source) => void, use_picture: (picture: Picture | null) => void, measure: (name: string, file: Blob, encoding: Json, fov_deg: number) => Promise<number>,
+   * @param {{use: (source: Source) => void, use_picture: (picture: Picture | null) => void, look: (name: string, file: Blob, encoding: Json, fov_deg: number) => Promise<import("./depth_view.js").DepthView>,
    *          failed: (error: unknown) => void}} page */
   constructor(place, page) {
     this.place = place;
@@ -82,6 +87,9 @@ export class SourcePanel {
     input.addEventListener("change", () => {
       this.files[role] = input.files?.[0];
       chosen.textContent = this.files[role]?.name ?? "";
+      if (this.channels.length === 0) return;
+      this.#forget_channels();
+      this.show();
     });
     return element("div", { className: "field" }, element("label", { htmlFor: input.id }, label), element("div", { className: "control" }, input), chosen);
   }
@@ -120,10 +128,13 @@ export class SourcePanel {
 
   #common() {
     const ranged = RANGED.includes(this.encoding.kind);
+    const { channel, part } = this.encoding;
+    const chosen = channel === undefined ? {} : { channel, ...(part === undefined ? {} : { part }) };
     const set = (/** @type {string} */ key) => (/** @type {number} */ value) => (this.encoding = { ...this.encoding, [key]: value });
     const fields = [
+      ...this.#channel(),
       choice_field({ label: "Encoding", name: "encoding", value: this.encoding.kind, options: Object.entries(ENCODINGS) }, (kind) => {
-        this.encoding = RANGED.includes(kind) ? { kind, near: this.encoding.near ?? 0.1, far: this.encoding.far ?? 100 } : { kind };
+        this.encoding = { kind, ...(RANGED.includes(kind) ? { near: this.encoding.near ?? 0.1, far: this.encoding.far ?? 100 } : {}), ...chosen };
         this.show();
         /** @type {HTMLElement | null} */ (this.place.querySelector("[name=encoding]"))?.focus();
       }).node,
@@ -140,9 +151,29 @@ export class SourcePanel {
       this.encoding = holes ? { ...rest, empty: 0 } : rest;
     }).node);
     fields.push(number_field(
-      { label: "Distance of the subject", name: "distance", value: this.distance, min: 0, help: "in scene units, to place the light; 0: the median depth, measured by the service" },
+      { label: "Distance of the subject", name: "distance", value: this.distance, min: 0, help: "in scene units, to place the light; 0: the median depth" },
       (value) => (this.distance = value)).node);
     return [...fields, button("Light it", () => this.apply(), "primary")];
+  }
+
+  /** Which channel is depth, where the service could not tell. */
+  #channel() {
+    if (this.channels.length === 0) return [];
+    const at = this.channels.findIndex(({ channel, part }) => channel === this.encoding.channel && part === this.encoding.part);
+    const options = this.channels.map((one, i) => /** @type {[string, string]} */ ([String(i), channel_label(one)]));
+    return [choice_field({ label: "Channel", name: "channel", value: String(at), options: at < 0 ? [["-1", "choose ..."], ...options] : options, help: "the one that holds the depth" }, (index) => {
+      const { channel: _, part: __, ...rest } = this.encoding;
+      this.encoding = { ...rest, ...this.channels[Number(index)] };
+      this.show();
+      this.apply();
+    }).node];
+  }
+
+  /** Channels of the last file are none of the next. */
+  #forget_channels() {
+    const { channel: _, part: __, ...rest } = this.encoding;
+    this.encoding = rest;
+    this.channels = [];
   }
 
   /** Files that were dropped: sorted by what they hold and by their names, and used. @param {File[]} files */
@@ -167,6 +198,7 @@ export class SourcePanel {
     this.files = light_view ? roles_of(depth) : { depth: depth[0] ?? kept, picture: picture ?? waiting };
     if (picture) this.look = look;
     this.kind = light_view ? "light_view" : "camera";
+    if (depth.length > 0) this.#forget_channels();
     this.show();
     if (kept && this.lit === kept) return this.#show_picture();
     if (!light_view && !this.files.depth) throw new Error(`${picture?.name} is taken as a picture, a ${look}. Its depth image is missing: drop it, too, or choose it under Scene.`);
@@ -174,11 +206,24 @@ export class SourcePanel {
   }
 
   async apply() {
+    const wanted = ++this.#wanted;
     try {
-      this.page.use(await this.#source());
+      const source = await this.#source();
+      if (wanted === this.#wanted) this.page.use(source);
     } catch (error) {
-      this.page.failed(error);
+      if (wanted !== this.#wanted) return;
+      this.page.failed(this.#offer_channels(error));
     }
+  }
+
+  /** Where the service says that it may be one of several channels, they are there to choose from, and the error says so. @param {unknown} error */
+  #offer_channels(error) {
+    const channels = channels_in(error instanceof Error ? error.message : "");
+    if (channels.length === 0) return error;
+    this.channels = channels;
+    this.show();
+    /** @type {HTMLElement | null} */ (this.place.querySelector("[name=channel]"))?.focus();
+    return new Error(`${/** @type {Error} */ (error).message}. Choose it under Scene, Channel.`);
   }
 
   /** @param {Role} role @param {string} what @returns {File} */
@@ -193,12 +238,13 @@ export class SourcePanel {
     if (encoding.scale === 1) delete encoding.scale;
     if (encoding.shift === 0) delete encoding.shift;
     const common = { encoding, vertical_fov_deg: this.fov_deg };
-    const measured = (/** @type {string} */ name, /** @type {Blob} */ file) => (this.distance > 0 ? this.distance : this.page.measure(name, file, encoding, this.fov_deg));
+    const look = (/** @type {string} */ name, /** @type {Blob} */ file) => this.page.look(name, file, encoding, this.fov_deg);
     if (this.kind === "camera") {
       const file = this.#needed("depth", "Depth pass");
       const name = part_name(file.name, "depth", []);
       const picture = this.files.picture ? await Picture.read(this.files.picture) : null;
-      const source = camera_source({ ...common, name, file, distance: await measured(name, file), picture });
+      const view = await look(name, file);
+      const source = camera_source({ ...common, name, file, distance: this.distance || view.median, picture, view });
       this.lit = file;
       return source;
     }
@@ -208,7 +254,7 @@ export class SourcePanel {
     const back_name = back ? part_name(back.name, "back", [front_name, receiver_name]) : "";
     return light_view_source({
       front: [front_name, front], receiver: [receiver_name, receiver], ...(back ? { back: [back_name, back] } : {}), encoding,
-      tan_half_fov: Math.tan((this.fov_deg * Math.PI) / 360), distance: await measured(receiver_name, receiver),
+      tan_half_fov: Math.tan((this.fov_deg * Math.PI) / 360), distance: this.distance || (await look(receiver_name, receiver)).median,
     });
   }
 }

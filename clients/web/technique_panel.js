@@ -1,6 +1,6 @@
 // @ts-check
 // A technique and its keys, as controls made from what the service says of it.
-import { button, choice_field, element, flag_field, number_field } from "./fields.js";
+import { button, choice_field, element, flag_field, number_field, prose } from "./fields.js";
 
 /** @typedef {import("./client.js").Technique} Technique */
 /** @typedef {import("./client.js").Json} Json */
@@ -65,6 +65,17 @@ export function draft_of(techniques, choice, source, light) {
   return { kind, settings: { ...suggested_choice(techniques, kind, source.suggested).settings, ...quick } };
 }
 
+/** What may stand in for a technique that turns out to be slow, as one may where the light is inside a caster: the first other one of the
+ * source's that takes the light.
+ * @param {Technique[]} techniques @param {Choice} choice @param {{stand_ins: string[], suggested: Json}} source
+ * @param {string} light its kind @returns {Choice | null} */
+export function stand_in_of(techniques, choice, source, light) {
+  if (TRACED.includes(choice.kind)) return null;
+  const fits = (/** @type {string} */ kind) => kind !== choice.kind && techniques.some((known) => known.kind === kind && known.lights.includes(light));
+  const kind = source.stand_ins.find(fits);
+  return kind ? suggested_choice(techniques, kind, source.suggested) : null;
+}
+
 /** Fills `place` with the choice of technique and its controls, and calls `changed` with each new choice.
  * @param {HTMLElement} place @param {Technique[]} techniques @param {Choice} choice
  * @param {{light: string, suggested: Json}} fits kind of the light, and settings that suit the source @param {(choice: Choice) => void} changed */
@@ -81,7 +92,7 @@ export function technique_panel(place, techniques, choice, fits, changed) {
   );
   place.replaceChildren(pick.node);
   if (!technique) return;
-  place.append(element("p", { className: "help" }, technique.summary));
+  place.append(element("p", { className: "help" }, ...prose(technique.summary)));
   if (!technique.lights.includes(fits.light))
     place.append(element("p", { className: "notice", role: "status" }, `${label_of(technique.kind)} takes no ${fits.light} light; it takes: ${technique.lights.join(", ")}.`));
 

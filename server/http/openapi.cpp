@@ -9,6 +9,7 @@
 
 #include "http/describe.hpp"
 #include "http/route.hpp"
+#include "masks/depth_view.hpp"
 #include "masks/mask_format.hpp"
 #include "process/problem.hpp"
 
@@ -84,6 +85,11 @@ Json responses_of(const Route& route)
             responses["201"]["headers"] = {{"Location", header("the path of the kept scene")}};
         }
         break;
+    case Answer::depth:
+        responses["200"] = {{"description", "planar depth, infinite where nothing is: every so many pixels of the image"},
+                            {"headers", {{"Penumbra-Size", header("width and height of the image itself, as 640x480")}}},
+                            {"content", content("image/x-portable-floatmap", binary_schema)}};
+        break;
     case Answer::nothing:
         responses["204"] = {{"description", "done"}};
         break;
@@ -129,6 +135,12 @@ Json operation_of(const Route& route, const Options& options)
                              "channels low and high, as image/x-exr; of a technique whose `bounds` is true"},
              {"schema", {{"type", "string"}, {"enum", {"mask", "bound"}}, {"default", "mask"}}}});
     }
+    if (route.answer == Answer::depth)
+        parameters.push_back(
+            {{"name", "side"},
+             {"in", "query"},
+             {"description", "the most pixels that the answer is wide or high"},
+             {"schema", {{"type", "integer"}, {"minimum", 1}, {"maximum", max_depth_side}, {"default", default_depth_side}}}});
     if (!parameters.empty()) operation["parameters"] = parameters;
     if (route.method == "POST") operation["requestBody"] = body_of(route, options);
     operation["responses"] = responses_of(route);

@@ -15,6 +15,7 @@ constexpr std::array list{
     Route{"GET", "/v1/scenes/{id}", "Whether a scene is still kept.", scene},
     Route{"DELETE", "/v1/scenes/{id}", "Let a kept scene go.", nothing},
     Route{"POST", "/v1/scenes/{id}/masks", "Compute a mask of a kept scene, with lights, receivers, technique or output changed.", mask},
+    Route{"POST", "/v1/depth", "The depth of a scene's receivers as the service reads it, at most `side` pixels wide and high.", depth},
     Route{"GET", "/v1/techniques", "Each technique with its keys as JSON Schema, its lights and what it needs.", json},
     Route{"GET", "/v1/devices", "The OpenCL devices of the machine; `selected` is the one that computes.", json},
     Route{"GET", "/healthz", "The process answers.", text, true},

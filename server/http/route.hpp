@@ -7,7 +7,7 @@
 
 namespace penumbra::server {
 
-enum class Answer { mask, scene, json, text, page, nothing };
+enum class Answer { mask, scene, depth, json, text, page, nothing };
 
 struct Route {
     std::string_view method, path, summary; // `path` may hold one segment {id}

@@ -67,6 +67,7 @@ private:
     SharedBytes read_body(const Request& request) const;
     void post_mask(const Request& request, Response& response);
     void post_scene(const Request& request, Response& response);
+    void post_depth(const Request& request, Response& response);
     void post_kept_mask(const Request& request, Response& response);
     void get_scene(const Request& request, Response& response);
     void delete_scene(const Request& request, Response& response);

@@ -9,6 +9,7 @@
 #include "http/answer.hpp"
 #include "masks/multipart.hpp"
 #include "http/service_http.hpp"
+#include "masks/depth_view.hpp"
 #include "masks/mask_format.hpp"
 #include "masks/masks.hpp"
 
@@ -156,6 +157,24 @@ void Service::post_scene(const Request& request, Response& response)
     }
     response.set_header("Location", "/v1/scenes/" + id);
     response.set_content(describe(*scene), "application/json");
+}
+
+void Service::post_depth(const Request& request, Response& response)
+{
+    Connection& connection = Connection::current();
+    const auto admitted = gate_.admit();
+    const int side = depth_side_from({request.params.begin(), request.params.end()});
+    const Body body = read_body(request);
+    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+
+    const auto slot = enter_slot();
+    const Scene scene = decode_scene(parts, options_, connection.request());
+    const std::vector<std::byte> bytes = encode_image(depth_view(scene.receivers, side), {.format = "pfm", .bits = 32});
+    response.status = 200;
+    response.set_header("Penumbra-Size", std::to_string(scene.receivers.width) + "x" + std::to_string(scene.receivers.height));
+    if (!scene.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(scene.warnings));
+    response.body.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    response.set_header("Content-Type", "image/x-portable-floatmap");
 }
 
 void Service::post_kept_mask(const Request& request, Response& response)

@@ -79,6 +79,7 @@ void Service::set_routes()
     };
     post("/v1/masks", &Service::post_mask);
     post("/v1/scenes", &Service::post_scene);
+    post("/v1/depth", &Service::post_depth);
     post("/v1/scenes/[0-9a-f]{64}/masks", &Service::post_kept_mask);
     const char* const scene = "/v1/scenes/[0-9a-f]{64}";
     http_->Get(scene, [this](const Request& request, Response& response) { guarded(response, [&] { get_scene(request, response); }); });

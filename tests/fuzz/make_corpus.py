@@ -347,6 +347,29 @@ def scenes():
     put("scene", "frames.json", json.dumps({
         "penumbra": 1, "light": {**rectangle, "emission": ["light.exr", "light.exr", "light.exr"]},
         "occluders": {"camera": own, "depth": {"front": "depth.exr"}}, "receivers": {"camera": own, "depth": "depth.exr"}}))
+    put("scene", "channels.json", json.dumps({
+        "penumbra": 1, "light": {"kind": "point", "center": [0, 6, 0]},
+        "occluders": {"camera": own, "depth": {"front": "channels.exr"}, "encoding": {"kind": "planar", "channel": "near.Z", "part": 0, "precision": 0.01}},
+        "receivers": {"camera": own, "depth": "channels.exr", "encoding": {"kind": "radial", "channel": "far.Z", "scale": 3}},
+        "technique": {"kind": "shadow_map"}}))
+    lens = {**view, "intrinsics": {"fx": 4, "fy": 4.5, "cx": 2, "cy": 1.5}, "shift": [0.25, -0.125]}
+    del lens["vertical_fov_deg"]
+    anchored = {"kind": "disparity", "channel": "near.Z", "anchors": [{"pixel": [0, 0], "depth": 4}, {"pixel": [3, 2], "depth": 1}]}
+    put("scene", "intrinsics.json", json.dumps({
+        "penumbra": 1, "light": rectangle,
+        "objects": [{"depth": "channels.exr", "camera": lens, "encoding": anchored, "thickness": "auto"},
+                    {"depth": "byte.png", "camera": {**view, "shift": [1, 0]}, "encoding": {"kind": "disparity", "scale": 0.5, "shift": 0.125, "precision": 1}, "thickness": 0.5}],
+        "receivers": {"camera": lens, "depth": "byte.png", "encoding": {"kind": "disparity", "scale": 0.25, "shift": 0.5}},
+        "technique": {"kind": "depth_trace"}}))
+    put("scene", "positions.json", json.dumps({
+        "penumbra": 1, "light": rectangle, "objects": [{"position": "light.exr", "camera": view, "encoding": {"scale": 2, "empty": 1}}],
+        "receivers": {"camera": placed, "position": "light.exr", "encoding": {"empty": 0, "scale": -1}}, "technique": {"kind": "ray_traced"}}))
+    put("scene", "weld.json", json.dumps({
+        "penumbra": 1, "light": rectangle, "objects": [quad, {"mesh": "cube.ply", "weld": 0.001, "translate": [0, 1, 0]}],
+        "receivers": {"camera": view, "resolution": [8, 8]}, "technique": {"kind": "soft_shadow_volume"}}))
+    put("patch", "channel.json", json.dumps({"receivers": {"camera": view, "depth": "channels.exr", "encoding": {"kind": "planar", "channel": "far.Z", "part": 0, "precision": 0.5}}}))
+    put("patch", "intrinsics.json", json.dumps({"receivers": {"camera": lens, "depth": "channels.exr", "encoding": anchored}}))
+    put("patch", "position.json", json.dumps({"receivers": {"camera": placed, "depth": None, "position": "light.exr", "encoding": None}}))
     put("patch", "lights.json", json.dumps({"lights": lights, "light": None, "receivers": {"camera": view}}))
     for technique, keys in techniques.items():
         put("patch", technique + ".json", json.dumps({"technique": {"kind": technique, **keys}}))

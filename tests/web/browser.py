@@ -30,16 +30,46 @@ def png_bytes(width, height, colour):
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
-class Server:
-    """penumbra-server on a free port; PENUMBRA_URL names one that runs already."""
+def exr_bytes(width, height, parts):
+    """An uncompressed EXR of float32: parts is [(name, {channel: value})], each channel of one value all over."""
+    several = len(parts) > 1
 
-    def __init__(self, **environment):
+    def attribute(name, kind, data):
+        return f"{name}\0{kind}\0".encode() + struct.pack("<i", len(data)) + data
+
+    headers, chunks = [], []
+    for number, (name, channels) in enumerate(parts):
+        ordered = sorted(channels)
+        listed = b"".join(one.encode() + b"\0" + struct.pack("<iB3xii", 2, 0, 1, 1) for one in ordered) + b"\0"
+        window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+        header = (attribute("channels", "chlist", listed) + attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", window)
+                  + attribute("displayWindow", "box2i", window) + attribute("lineOrder", "lineOrder", b"\0")
+                  + attribute("pixelAspectRatio", "float", struct.pack("<f", 1)) + attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0))
+                  + attribute("screenWindowWidth", "float", struct.pack("<f", 1)))
+        if several:
+            header += (attribute("name", "string", name.encode()) + attribute("type", "string", b"scanlineimage")
+                       + attribute("chunkCount", "int", struct.pack("<i", height)))
+        headers.append(header + b"\0")
+        row = b"".join(struct.pack("<f", channels[one]) * width for one in ordered)
+        chunks += [(struct.pack("<i", number) if several else b"") + struct.pack("<ii", y, len(row)) + row for y in range(height)]
+    head = struct.pack("<ii", 20000630, 2 | (0x1000 if several else 0)) + b"".join(headers) + (b"\0" if several else b"")
+    at, offsets = len(head) + 8 * len(chunks), []
+    for chunk in chunks:
+        offsets.append(at)
+        at += len(chunk)
+    return head + struct.pack(f"<{len(offsets)}Q", *offsets) + b"".join(chunks)
+
+
+class Server:
+    """penumbra-server on a free port, or on that one; PENUMBRA_URL names one that runs already."""
+
+    def __init__(self, port=0, **environment):
         self.process = None
         self.url = os.environ.get("PENUMBRA_URL", "")
-        if self.url and not environment:
+        if self.url and not environment and port == 0:
             return
         self.process = subprocess.Popen(
-            [os.environ["PENUMBRA_SERVER"], "--port", "0"],
+            [os.environ["PENUMBRA_SERVER"], "--port", str(port)],
             env={**os.environ, **environment},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -64,6 +94,7 @@ class Server:
             self.process.wait(30)
             self.drain.wait(5)
             self.process.stderr.close()
+            self.process = None
 
 
 def chromium():
@@ -125,6 +156,11 @@ class PageTest(unittest.TestCase):
                 return value
             time.sleep(0.03)
         self.fail(f"nothing came of {script!r} in {WAIT_S} s; the page says: {self.problem()!r}")
+
+    def settled(self):
+        """Waits until the state as it is has a mask, or the service's word why not: that version."""
+        return self.wait_for("const d = document.getElementById('mask').dataset, last = Math.max(Number(d.version), Number(d.refused ?? -1)); "
+                             "return last === Number(d.asked) && last")
 
     def problem(self):
         return self.js("const box = document.getElementById('problem'); return box.hidden ? '' : box.textContent")

@@ -3,6 +3,7 @@
 import base64
 import json
 import math
+import struct
 import unittest
 
 from browser import PageTest
@@ -111,6 +112,106 @@ class Modules(PageTest):
         )
         self.assertEqual(got, {"ran": ["a", "d", "e"], "most": 1, "busy": False})
 
+    def test_a_service_that_is_away_is_asked_less_and_less(self):
+        got = self.module(
+            """
+            const [{Outage}, {NoAnswer, ServiceError}] = await Promise.all(["outage", "client"].map(page));
+            const said = [], slept = [];
+            const outage = new Outage((text) => said.push(text), async (ms) => { slept.push(ms); });
+            const waits = async (error) => {
+                const from = slept.length;
+                await outage.wait(error);
+                return slept.slice(from).reduce((sum, ms) => sum + ms, 0) / 1000;
+            };
+            const busy = (retry_after_s) => new ServiceError(503, "full", "busy", retry_after_s);
+            const result = {away: []};
+            for (let i = 0; i < 6; i++) result.away.push(await waits(new NoAnswer()));
+            outage.over();
+            result.last = said.at(-1);
+            outage.over();
+            result.quiet = said.at(-2) !== "";
+            result.again = await waits(new NoAnswer());
+            result.told = await waits(busy(7));
+            result.short = await waits(busy(0.5));
+            result.untold = await waits(busy(0));
+            const from = slept.length;
+            await Promise.all([outage.wait(new NoAnswer()), outage.wait(new NoAnswer())]);
+            result.together = slept.length - from;
+            result.first = said.slice(0, 4);
+            result.is = [new NoAnswer(), busy(1), new ServiceError(422, "", "", 0), new Error()].map(Outage.is);
+            return result;
+            """
+        )
+        self.assertEqual(got["away"], [1, 2, 4, 8, 15, 15])
+        self.assertEqual((got["last"], got["quiet"]), ("", True))
+        self.assertEqual((got["again"], got["told"], got["short"], got["untold"]), (1, 7, 0.5, 8))
+        self.assertEqual(got["together"], 15, "one wait for both, a second at a time")
+        text = "The service does not answer; trying again "
+        self.assertEqual(got["first"], [text + "in 1 s", text + "now", text + "in 2 s", text + "in 1 s"])
+        self.assertEqual(got["is"], [True, True, False, False])
+
+    def test_the_median_is_that_of_what_is_seen(self):
+        got = self.module(
+            """
+            const {median_of} = await page("depth_view");
+            return [[3, 1, Infinity, 2], [10, 9, 100], [Infinity, NaN], []].map((values) => median_of(Float32Array.from(values)));
+            """
+        )
+        self.assertEqual(got, [2, 10, None, None])
+
+    def test_depth_is_read_as_the_service_reads_it(self):
+        pixels = struct.pack("<4f", 4, 2, 1, 0)  # from the last row up: disparities, of which 0 is nothing
+        got = self.module(
+            """
+            const [{Client}, {depth_view}] = await Promise.all(["client", "depth_view"].map(page));
+            const bytes = Uint8Array.from(atob(given[0]), (c) => c.charCodeAt(0));
+            const view = await depth_view(new Client(), "d.pfm", new Blob([bytes]), {kind: "disparity", scale: 8}, 50);
+            return {...view, file: view.file.size};
+            """,
+            base64.b64encode(b"Pf\n2 2\n-1\n" + pixels).decode(),
+        )
+        self.assertEqual((got["width"], got["height"], got["size"], got["median"]), (2, 2, [2, 2], 4))
+
+    def test_channels_are_those_that_the_service_lists(self):
+        got = self.module("const {channels_in} = await page('channels'); return given.map(channels_in);",
+                          "receivers.depth: a.exr has no channel that is depth for certain; it has R, G, B (name one with encoding.channel)",
+                          'a.exr has more than one depth: Z in part 0 "x", Z in part 2; it has part 0 "x": Z; part 2: A, Z (choose one with encoding.part or encoding.channel)',
+                          'a.exr has no channel "q"; it has a.Z, b.Z and 12 more', "light.radius: is below 0; it has no place", "")
+        self.assertEqual(got[0], [{"channel": one} for one in "RGB"])
+        self.assertEqual(got[1], [{"channel": "Z", "part": 0}, {"channel": "A", "part": 2}, {"channel": "Z", "part": 2}])
+        self.assertEqual(got[2], [{"channel": "a.Z"}, {"channel": "b.Z"}])
+        self.assertEqual(got[3:], [[], []])
+
+    def test_a_light_is_crowded_where_a_caster_is_nearer_than_its_corners(self):
+        got = self.module(
+            """
+            const {distance_to, is_crowded, eased} = await page("crowding");
+            const quad = {center: [0, 0, 0], half_u: [2, 0, 0], half_v: [0, 0, -1]};
+            const light = (x, y, z) => ({kind: "rectangle", position: [x, y, z], target: [0, 0, 0], width: 0.6, length: 0.8, radius: 0, angular_diameter_deg: 0});
+            const near = light(0, 0.4, 0), objects = [{quad}], of = (kind, resolution) => eased({kind, settings: {resolution}}, near, objects).settings.resolution;
+            return {
+                distances: [[0, 3, 0], [2, 0, 1], [5, 4, 0], [1, 0, -3]].map((point) => distance_to(point, quad)),
+                crowded: [is_crowded(near, objects), is_crowded(light(0, 0.6, 0), objects), is_crowded(near, [{quad, casts: false}]), is_crowded({...near, kind: "point"}, objects)],
+                map: [of("soft_shadow_map", 0), of("soft_shadow_map", 512), of("soft_shadow_map", 32), of("smoothie", 512)],
+            };
+            """
+        )
+        self.assertEqual(got["distances"], [3, 0, 5, 2])
+        self.assertEqual(got["crowded"], [True, False, False, False])  # the corners are 0.5 from the middle
+        self.assertEqual(got["map"], [48, 48, 32, 512])
+
+    def test_a_line_is_cut_where_the_camera_stands(self):
+        got = self.module(
+            """
+            const {before_camera} = await page("light_outline");
+            const square = [[-1, 0, -1], [1, 0, -1], [1, 0, 3], [-1, 0, 3]];
+            return [before_camera(square, 1, true), before_camera(square.slice(1, 3), 1, false), before_camera([[0, 0, -1], [0, 0, -2]], 1, true)];
+            """
+        )
+        self.assertEqual(sorted(map(tuple, got[0])), [(-1, 0, 1), (-1, 0, 3), (1, 0, 1), (1, 0, 3)])
+        self.assertEqual(got[1], [[1, 0, 1], [1, 0, 3]])
+        self.assertEqual(got[2], [])
+
     def test_a_technique_that_nobody_knows_yet_gets_controls(self):
         got = self.module(
             """
@@ -176,7 +277,7 @@ class Modules(PageTest):
             for (let i = 0; i < 500; i++) {
                 const random = () => 20 * (Math.sin(i * 12.9898 + (worst.n = (worst.n ?? 0) + 1)) * 43758.5453 % 1) - 10;
                 const position = i === 0 ? [0, 5, 0] : [random(), random(), random()], target = i === 0 ? [0, 0, 0] : [random(), random(), random()];
-                const light = light_json({kind: "rectangle", position, target, width: 1e-3, height: 7, radius: 1, angular_diameter_deg: 1});
+                const light = light_json({kind: "rectangle", position, target, width: 1e-3, length: 7, radius: 1, angular_diameter_deg: 1});
                 const [u, v] = [normalized(light.half_u), normalized(light.half_v)];
                 const along = normalized(target.map((value, k) => value - position[k]));
                 worst.angle = Math.max(worst.angle, Math.abs(dot(u, v)));

@@ -6,7 +6,7 @@ import re
 import time
 import unittest
 
-from browser import EXAMPLES, WAIT_S, PageTest, Server, png_bytes
+from browser import EXAMPLES, WAIT_S, PageTest, Server, exr_bytes, png_bytes
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -21,7 +21,7 @@ class Page(PageTest):
         self.js("document.querySelector(`[name=mode][value=${arguments[0]}]`).click()", mode)
 
     def wait_for_b(self):
-        self.wait_for("const d = document.getElementById('mask').dataset; return d.versionB && d.versionB === d.version")
+        self.wait_for("const d = document.getElementById('mask').dataset; return d.versionB && d.versionB === d.version && d.versionB === d.asked")
 
     def assert_shadowed(self, mask):
         self.assertLess(mask["low"], 30)
@@ -63,7 +63,7 @@ class Page(PageTest):
     def test_every_kind_and_size_of_light(self):
         self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("ray_traced"))
         self.change(lambda: self.set_number("#technique_a [name=samples]", 4))
-        sizes = {"directional": ["angular_diameter_deg"], "sphere": ["radius"], "point": [], "rectangle": ["width", "height"]}
+        sizes = {"directional": ["angular_diameter_deg"], "sphere": ["radius"], "point": [], "rectangle": ["width", "length"]}
         for kind, names in sizes.items():
             self.change(lambda: Select(self.find("[name=light_kind]")).select_by_value(kind))
             for name in names:
@@ -92,6 +92,213 @@ class Page(PageTest):
             self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value(technique["kind"]))
             names = self.js("return [...document.querySelectorAll('#technique_a [name]')].map((one) => one.name)")
             self.assertEqual(sorted(names), sorted(technique["schema"]["properties"]))
+
+    def place_light(self, *position):
+        """At once, as a drag does: three fields, of which the page asks for the last."""
+        for axis, value in zip("xyz", position):
+            self.set_number(f"[name=position_{axis}]", value)
+
+    def test_the_light_goes_everywhere_and_never_ends_in_an_error(self):
+        self.js("document.querySelector('#light details').open = true")
+        # Through the pergola and the arch, at their middles, below the floor, on it, behind the wall, on the aim, far away, and back.
+        ways = [(-1.5, 2.2, -1.2), (-1.5, 1, -1.2), (2.15, 1.9, -1.5), (0, 0.01, 0.5), (0, 0, 0.5), (0, -0.5, 0.5), (0, 2.5, -3.5), (0, 2.5, -4.5),
+                (0, 0.6, -0.6), (0, -3, 20), (200, 900, -50), (1, 0.35, 1.6), (-0.6, 0.9, 2.1), (-3.4, 6.2, 4.8)]
+        refused = []
+        for technique in ("soft_shadow_map", "shadow_map", "soft_shadow_volume"):
+            Select(self.find("#technique_a [name=kind]")).select_by_value(technique)
+            for position in ways:
+                self.place_light(*position)
+                self.settled()
+                if not self.problem():
+                    continue
+                refused.append((technique, position))
+                # The last mask stays, greyed, and one line says why.
+                self.assertTrue(self.js("return document.getElementById('problem').classList.contains('calm')"), self.problem())
+                self.assertTrue(self.js("return document.getElementById('frame').classList.contains('stale')"))
+                self.assertNotIn("\n", self.problem())
+                self.assertGreater(self.mask()["high"], 250)
+            self.assertEqual(self.problem(), "", "back where it began")
+            self.assertLess(self.mask()["low"], 30)
+        self.assertTrue(all("422" in error for error in self.console_errors()), refused)
+
+    def test_a_light_in_a_caster_has_a_coarse_map_and_says_so(self):
+        self.place_light(1, 0.35, 1.6)
+        self.wait_for("return document.getElementById('name_a').textContent === 'soft_shadow_map with a map of 48 x 48: the light touches a caster'")
+        self.settled()
+        self.assertLess(self.mask()["low"], 30)
+        self.place_light(-3.4, 6.2, 4.8)
+        self.wait_for("return document.getElementById('name_a').hidden")
+        self.assertEqual(self.mask()["size"], [512, 512])
+
+    def test_what_is_slow_has_another_stand_in(self):
+        self.delay("soft_shadow_map", 3)
+        self.set_number("[name=position_x]", 2)
+        self.wait_for("return document.getElementById('mask').dataset.technique === 'soft_shadow_volume'")
+        self.assertEqual(self.find("#name_a").text, "soft_shadow_volume: draft at 256 x 256; soft_shadow_map when the light rests")
+        self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
+        # A light that moves on does not wait.
+        before = self.js("return performance.now()")
+        self.change(lambda: self.set_number("[name=position_x]", 3))
+        self.assertLess(self.js("return performance.now()") - before, 2000)
+        self.wait_for("const d = document.getElementById('mask').dataset; return d.technique === 'soft_shadow_map' && d.version === d.asked")
+        self.assertEqual(self.mask()["size"], [512, 512])
+        self.wait_for("return document.getElementById('name_a').hidden")
+
+    def delay(self, kind, seconds):
+        """From now on the page's requests that hold this word, or text with quotes, take longer: so that there is something to see."""
+        self.js(
+            """
+            const own = window.fetch, [kind, ms] = arguments;
+            window.fetch = async (path, init) => {
+                if (typeof init?.body === "string" && init.body.includes(kind.includes('"') ? kind : `"${kind}"`)) await new Promise((then) => setTimeout(then, ms));
+                return own(path, init);
+            };
+            """,
+            kind,
+            1000 * seconds,
+        )
+
+    def refuse(self, text):
+        """From now on the service has an error for requests that hold this text."""
+        self.js(
+            """
+            const own = window.fetch, text = arguments[0], problem = {title: "Unprocessable", detail: "light.center: is in a wall"};
+            window.fetch = (path, init) => typeof init?.body === "string" && init.body.includes(text)
+                ? Promise.resolve(new Response(JSON.stringify(problem), {status: 422, headers: {"Content-Type": "application/problem+json"}}))
+                : own(path, init);
+            """,
+            text,
+        )
+
+    def test_one_refused_position_keeps_the_mask_and_the_next_goes_on(self):
+        before = self.mask()["digest"]
+        self.refuse("[7.25,")
+        self.set_number("[name=position_x]", 7.25)
+        self.wait_for("return !document.getElementById('problem').hidden")
+        self.assertEqual(self.problem(), "No mask here: light.center: is in a wall")
+        box = self.find("#problem")
+        self.assertEqual((box.get_attribute("class"), box.get_attribute("role")), ("failure calm", "status"))
+        self.assertEqual(self.mask()["digest"], before)
+        self.wait_for("return getComputedStyle(document.getElementById('mask')).opacity === '0.3'")
+        self.screenshot("page_refused.png")
+        self.change(lambda: self.set_number("[name=position_x]", 6))
+        self.assertEqual(self.problem(), "")
+        self.assertNotIn("stale", self.find("#frame").get_attribute("class"))
+        self.wait_for("return getComputedStyle(document.getElementById('mask')).opacity === '1'")
+
+    def test_a_mask_stands_under_its_own_name(self):
+        self.delay("ray_traced", 2.5)
+        self.assertFalse(self.find("#name_a").is_displayed())
+        Select(self.find("#technique_a [name=kind]")).select_by_value("ray_traced")
+        self.assertEqual(self.find("#name_a").text, "soft_shadow_map: earlier")
+        self.assertEqual(self.find("#frame").get_attribute("class"), "frame stale other")
+        self.wait_for("return getComputedStyle(document.getElementById('mask')).opacity === '0.3'")
+        self.wait_for("return document.getElementById('busy').textContent === 'computing ray_traced'")
+        self.wait_for("return document.getElementById('busy').textContent === 'computing ray_traced, 2 s'")
+        self.screenshot("page_busy.png")
+        # A draft of it at fewer pixels may come first, and says so.
+        self.wait_for("return document.getElementById('name_a').hidden")
+        self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
+        self.assertEqual(self.mask()["size"], [512, 512])
+        self.wait_for("return document.getElementById('busy').hidden")
+        # Another setting is another mask, too.
+        self.delay("\"samples\":4", 1)
+        self.set_number("#technique_a [name=samples]", 4)
+        self.assertEqual(self.find("#name_a").text, "ray_traced: earlier")
+        self.wait_for("return document.getElementById('frame').className === 'frame'")
+
+    def test_the_second_mask_stands_under_its_own_name(self):
+        self.view("wipe")
+        self.wait_for_b()
+        self.delay("smoothie", 1.5)
+        Select(self.find("#technique_b [name=kind]")).select_by_value("smoothie")
+        self.assertEqual(self.find("#name_b").text, "B smoothie: to come")
+        self.wait_for_b()
+        self.assertEqual(self.find("#name_b").text, "B smoothie")
+        self.delay("half_u", 1)
+        self.set_number("[name=position_x]", 1)
+        self.assertEqual(self.find("#name_b").text, "B smoothie: earlier")
+        self.assertIn("stale_b", self.find("#frame").get_attribute("class"))
+        self.wait_for_b()
+        self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
+
+    def overlay(self):
+        """Pixels of the drawing over the mask: how many there are, where their middle is, and a digest."""
+        return self.module(
+            """
+            await new Promise((then) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(then)), 50));  // it is drawn every 40 ms
+            const canvas = document.getElementById("overlay"), {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            let drawn = 0, x = 0, y = 0, digest = 0;
+            for (let i = 0; i < data.length; i += 4) {
+                if (data[i + 3] === 0) continue;
+                const pixel = i / 4;
+                drawn++, x += pixel % canvas.width, y += Math.floor(pixel / canvas.width), digest = (Math.imul(digest, 31) + pixel) | 0;
+            }
+            return {drawn, x: x / drawn / canvas.width, y: y / drawn / canvas.height, digest};
+            """
+        )
+
+    def test_the_light_is_drawn_in_the_picture(self):
+        self.find("#casters").click()
+        # On the camera's axis, shining along it: the outline is a rectangle about the middle.
+        eye, target = (4.2, 5.4, 9.4), (0.05, 0.75, -0.6)
+        middle = [(e + t) / 2 for e, t in zip(eye, target)]
+        for axis, value in zip("xyz", target):
+            self.set_number(f"[name=target_{axis}]", value)
+        self.place_light(*middle)
+        drawn = self.overlay()
+        self.assertGreater(drawn["drawn"], 500)
+        self.assertAlmostEqual(drawn["x"], 0.5, delta=0.01)
+        self.assertAlmostEqual(drawn["y"], 0.5, delta=0.01)
+        # It is drawn where it is at once, before a mask comes.
+        self.delay("half_u", 1)
+        self.place_light(middle[0] + 0.5, middle[1], middle[2])
+        self.assertIn("stale", self.find("#frame").get_attribute("class"))
+        self.assertGreater(self.overlay()["x"], drawn["x"] + 0.02)
+        # Every kind; what is out of the picture or behind the camera has a mark at its edge.
+        for kind in ("sphere", "point", "directional", "rectangle"):
+            Select(self.find("[name=light_kind]")).select_by_value(kind)
+            self.assertGreater(self.overlay()["drawn"], 20, kind)
+        self.place_light(*(2 * e - t for e, t in zip(eye, target)))
+        self.assertGreater(self.overlay()["drawn"], 20)
+        self.find("#light_drawn").click()
+        self.assertEqual(self.overlay()["drawn"], 0)
+        self.settled()
+        self.console_errors()  # of lights that the technique does not take
+
+    def test_the_light_is_moved_beside_the_picture_on_a_tablet(self):
+        for width, height in ((768, 1024), (1024, 768), (1024, 600)):
+            self.resize(width, height)
+            self.wait_for("return innerWidth === arguments[0]", width)
+            boxes = self.js(
+                """
+                return ["light_pad", "light_height", "frame"].map((id) => document.getElementById(id).getBoundingClientRect())
+                    .map(({left, top, right, bottom}) => [left, top, right, bottom]);
+                """
+            )
+            for left, top, right, bottom in boxes:
+                self.assertGreaterEqual(min(left, top), 0, (width, boxes))
+                self.assertLessEqual(right, width, (width, boxes))
+                self.assertLessEqual(bottom, height, (width, boxes))
+            pad, _, frame = boxes
+            self.assertGreaterEqual(pad[0], frame[2], "beside the picture")
+            room, taken = self.js("const page = document.documentElement; return [page.clientWidth, page.scrollWidth]")
+            self.assertLessEqual(taken, room, width)
+            self.screenshot(f"page_tablet_{width}x{height}.png")
+
+    def test_one_word_for_one_thing_and_code_as_code(self):
+        words = self.js("return [...document.querySelectorAll('#light label')].map((one) => one.textContent.trim())")
+        self.assertIn("Length", words)
+        self.assertNotIn("Height", words)
+        self.assertEqual(self.find("#light_height").get_attribute("aria-label"), "Height of the light")
+        told = 0
+        for option in [one.get_attribute("value") for one in Select(self.find("#technique_a [name=kind]")).options]:
+            Select(self.find("#technique_a [name=kind]")).select_by_value(option)
+            self.assertNotIn("`", self.js("return document.body.textContent"), option)
+            told += len(self.browser.find_elements(By.CSS_SELECTOR, "#technique_a .help code"))
+        self.assertGreater(told, 0)
+        self.settled()
+        self.console_errors()
 
     def test_two_techniques_compared(self):
         self.view("wipe")
@@ -158,7 +365,7 @@ class Page(PageTest):
         self.assertFalse(self.find("#orbit").is_enabled())
         before = self.mask()
         self.assert_shadowed(before)
-        self.change(lambda: self.set_number("[name=light_height]", 2.5))
+        self.change(lambda: self.set_number("[name=light_length]", 2.5))
         self.assertNotEqual(before["digest"], self.mask()["digest"])
 
     def test_picked_files_do_as_dropped_ones(self):
@@ -269,7 +476,7 @@ class Relit(PageTest):
             self.penumbra("depth", EXAMPLES / "04_relight_depth_view.json", "--out", view)
         self.depth = view / "receiver.exr"
 
-    find, set_number, scene_file = Page.find, Page.set_number, Page.scene_file
+    find, set_number, scene_file, delay = Page.find, Page.set_number, Page.scene_file, Page.delay
 
     def picture(self, name, width=256, height=256):
         path = self.folder / name
@@ -302,20 +509,6 @@ class Relit(PageTest):
         pad = self.find("#light_pad")
         ActionChains(self.browser, duration=60).move_to_element_with_offset(pad, -40, 20).click_and_hold().move_by_offset(30, -20).move_by_offset(
             40, 30).move_by_offset(-20, 20).release().perform()
-
-    def delay(self, kind, seconds):
-        """From now on the page's requests for masks of this kind take longer: so that there is something to wait for, or to see."""
-        self.js(
-            """
-            const own = window.fetch, [kind, ms] = arguments;
-            window.fetch = async (path, init) => {
-                if (typeof init?.body === "string" && init.body.includes(`"${kind}"`)) await new Promise((then) => setTimeout(then, ms));
-                return own(path, init);
-            };
-            """,
-            kind,
-            1000 * seconds,
-        )
 
     def test_a_draft_while_the_light_moves_and_the_trace_when_it_rests(self):
         self.delay("depth_trace", 0.8)
@@ -462,6 +655,75 @@ class Relit(PageTest):
         self.assertIn("other.png", self.problem() + self.find("#source").text)
         self.console_errors()
 
+    def test_a_large_image_has_a_draft_at_fewer_pixels(self):
+        scene = json.loads((EXAMPLES / "04_relight_depth_view.json").read_text())
+        scene["receivers"]["resolution"] = [1280, 720]
+        (self.folder / "large.json").write_text(json.dumps(scene))
+        self.penumbra("depth", self.folder / "large.json", "--out", self.folder / "large")
+        self.delay("depth_trace", 1)
+        self.requests()
+        self.change(lambda: self.drop(self.folder / "large" / "receiver.exr"))
+        self.assertEqual(self.mask()["size"], [512, 288])
+        self.assertEqual(self.find("#name_a").text, "soft_shadow_map: draft at 512 x 288; depth_trace when the light rests")
+        self.assertIn("soft_shadow_map at 512 x 288 while the light moves", self.find("#draft_help").text)
+        # One request asked for the depth.
+        self.assertEqual(len([one for one in self.requests() if "/v1/depth" in one]), 1)
+        self.wait_for_trace()
+        self.assertEqual(self.mask()["size"], [1280, 720])
+        self.assertEqual(self.scene_file()["receivers"]["depth"], "receiver.exr")
+        # A technique that is no trace, and does not keep pace, has itself as a draft.
+        self.delay("soft_shadow_map", 0.2)
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_map"))
+        self.assertEqual(self.mask()["size"], [1280, 720])
+        self.change(lambda: self.find("#light_pad").send_keys(Keys.ARROW_RIGHT))
+        self.assertEqual(self.mask()["size"], [512, 288])
+        self.wait_for("return document.getElementById('mask').width === 1280")
+
+    def choose_channel(self, path, label):
+        """Drops an image that has several, and chooses one of those that the page lists."""
+        self.drop(path)
+        self.wait_for("return document.querySelector('[name=channel]')")
+        listed = Select(self.find("[name=channel]"))
+        texts = [one.text for one in listed.options]
+        self.assertIn("Choose it under Scene, Channel.", self.problem())
+        self.assertEqual(self.js("return document.activeElement.name"), "channel")
+        self.change(lambda: listed.select_by_visible_text(label))
+        self.assertEqual(self.problem(), "")
+        self.assertEqual(Select(self.find("[name=channel]")).first_selected_option.text, label)
+        return texts
+
+    def test_a_channel_is_chosen_where_there_are_several(self):
+        path = self.folder / "two.exr"
+        path.write_bytes(exr_bytes(16, 12, [("", {"near.Depth.Z": 2, "far.Depth.Z": 8, "A": 1})]))
+        self.assertEqual(self.choose_channel(path, "far.Depth.Z"), ["choose ...", "A", "far.Depth.Z", "near.Depth.Z"])
+        scene = self.scene_file()
+        self.assertEqual(scene["receivers"]["encoding"], {"kind": "planar", "channel": "far.Depth.Z"})
+        self.assertEqual(scene["receivers"]["camera"]["target"], [0, 0, -8])
+        self.change(lambda: Select(self.find("[name=channel]")).select_by_visible_text("near.Depth.Z"))
+        self.assertEqual(self.scene_file()["receivers"]["camera"]["target"], [0, 0, -2])
+        self.screenshot("page_channels.png")
+        # They are not the next image's.
+        self.change(lambda: self.drop(self.depth))
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "[name=channel]"), [])
+        self.assertNotIn("encoding", self.scene_file()["receivers"])
+        self.assertTrue(all("422" in error for error in self.console_errors()))
+
+    def test_a_part_is_chosen_where_there_are_several(self):
+        path = self.folder / "parts.exr"
+        path.write_bytes(exr_bytes(16, 12, [("left", {"Depth.Z": 3}), ("right", {"Depth.Z": 5})]))
+        self.assertEqual(self.choose_channel(path, "Depth.Z (part 1)"), ["choose ...", "Depth.Z (part 0)", "Depth.Z (part 1)"])
+        scene = self.scene_file()
+        self.assertEqual(scene["receivers"]["encoding"], {"kind": "planar", "channel": "Depth.Z", "part": 1})
+        self.assertEqual(scene["receivers"]["camera"]["target"], [0, 0, -5])
+        self.assertTrue(all("422" in error for error in self.console_errors()))
+
+    def test_a_channel_without_a_telling_name_is_chosen(self):
+        path = self.folder / "unnamed.exr"
+        path.write_bytes(exr_bytes(16, 12, [("", {"first": 3, "second": 4})]))
+        self.assertEqual(self.choose_channel(path, "second"), ["choose ...", "first", "second"])
+        self.assertEqual(self.scene_file()["receivers"]["camera"]["target"], [0, 0, -4])
+        self.assertTrue(all("422" in error for error in self.console_errors()))
+
     def test_bounds_are_saved(self):
         self.drop_and_trace(self.depth)
         self.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(self.folder)})
@@ -473,6 +735,64 @@ class Relit(PageTest):
         self.assertEqual((self.folder / "bound.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
         self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_map"))
         self.assertNotIn("Bounds, EXR", [one.text for one in self.browser.find_elements(By.CSS_SELECTOR, "#share .buttons button") if one.is_displayed()])
+
+
+class Away(PageTest):
+    """The service ends, and comes back."""
+
+    find, set_number = Page.find, Page.set_number
+
+    def outage(self):
+        return self.js("const one = document.getElementById('outage'); return one.hidden ? '' : one.textContent")
+
+    def setUp(self):
+        self.own = Server(PENUMBRA_SERVER_QUEUE="8")
+        self.addCleanup(lambda: self.own.stop())
+        self.resize(1440, 960)
+        self.browser.get(self.own.url + "/")
+        self.wait_for("return document.getElementById('mask').dataset.version")
+
+    def test_it_waits_for_a_service_that_does_not_answer_and_goes_on(self):
+        before = self.mask()["digest"]
+        port = int(self.own.url.rsplit(":", 1)[1])
+        self.own.stop()
+        self.set_number("[name=position_x]", 2)
+        self.wait_for("return document.getElementById('outage').textContent.includes('trying again in 1 s')")
+        self.wait_for("return document.getElementById('outage').textContent === 'The service does not answer; trying again in 2 s'")
+        self.assertEqual(self.problem(), "")
+        self.assertEqual(self.mask()["digest"], before)
+        self.assertIn("stale", self.find("#frame").get_attribute("class"))
+        self.screenshot("page_away.png")
+        # What is changed meanwhile is what is asked for then.
+        self.set_number("[name=position_x]", -2)
+        self.own = Server(port=port)
+        self.settled()
+        self.assertEqual(self.outage(), "")
+        self.assertNotEqual(self.mask()["digest"], before)
+        self.assertEqual(self.problem(), "")
+        self.assertEqual(self.find("#frame").get_attribute("class"), "frame")
+        self.assertTrue(all("ERR_" in error or "404" in error or "503" in error for error in self.console_errors()))
+
+    def test_a_busy_service_says_when(self):
+        self.js(
+            """
+            const own = window.fetch;
+            window.asked = [];
+            window.fetch = (path, init) => {
+                if (!path.includes("/masks")) return own(path, init);
+                window.asked.push(performance.now());
+                return window.asked.length > 1 ? own(path, init) : Promise.resolve(new Response(JSON.stringify({detail: "every place is taken"}),
+                    {status: 503, headers: {"Retry-After": "3"}}));
+            };
+            """
+        )
+        self.set_number("[name=position_x]", 2)
+        self.wait_for("return document.getElementById('outage').textContent === 'The service has no time: every place is taken; trying again in 3 s'")
+        self.settled()
+        self.assertEqual(self.outage(), "")
+        first, second = self.js("return window.asked")
+        self.assertGreater(second - first, 2999)
+        self.assertLess(second - first, 5000)
 
 
 class Token(PageTest):
