@@ -164,16 +164,19 @@ void Service::post_depth(const Request& request, Response& response)
     Connection& connection = Connection::current();
     const auto admitted = gate_.admit();
     const int side = depth_side_from({request.params.begin(), request.params.end()});
-    const Body body = read_body(request);
-    const auto parts = parse_multipart(body, boundary_of(connection.content_type), static_cast<std::size_t>(options_.parts));
+    const SharedBytes body = read_body(request);
+    const std::string form = boundary_of(connection.content_type);
+    const auto parts = parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
 
     const auto slot = enter_slot();
-    const Scene scene = decode_scene(parts, options_, connection.request());
-    const std::vector<std::byte> bytes = encode_image(depth_view(scene.receivers, side), {.format = "pfm", .bits = 32});
+    const std::array files{body.descriptor()};
+    Message message;
+    const CallReply answer = computed({.kind = Call::Kind::depth, .form = form, .side = side}, files, message, [&] { return id_of(parts); });
+    if (message.files.empty()) throw Error(ErrorCode::internal, "a worker's answer without its depth");
     response.status = 200;
-    response.set_header("Penumbra-Size", std::to_string(scene.receivers.width) + "x" + std::to_string(scene.receivers.height));
-    if (!scene.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(scene.warnings));
-    response.body.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    response.set_header("Penumbra-Size", std::to_string(answer.width) + "x" + std::to_string(answer.height));
+    if (!answer.reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(answer.reply.warnings));
+    response.body = copy_of(message.files.front());
     response.set_header("Content-Type", "image/x-portable-floatmap");
 }
 

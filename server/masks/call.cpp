@@ -40,6 +40,7 @@ std::string text_of(const Call& call)
                         {"frame", call.choice.frame},
                         {"bound", call.choice.image == MaskImage::bound},
                         {"format", call.format},
+                        {"side", call.side},
                         {"seconds", call.seconds}});
 }
 
@@ -54,6 +55,7 @@ Call call_from(std::string_view text)
                        .frame = json.at("frame"),
                        .image = json.at("bound").get<bool>() ? MaskImage::bound : MaskImage::mask},
             .format = json.at("format"),
+            .side = json.at("side"),
             .seconds = json.at("seconds")};
 }
 
@@ -76,6 +78,7 @@ std::string text_of(const CallReply& answer)
     json["mask"] = {{"technique", reply.technique},       {"pixels", reply.pixels},       {"device_bytes", reply.device_bytes},
                     {"stages", std::move(stages)},         {"compute_ms", reply.compute_ms}, {"encode_ms", reply.encode_ms},
                     {"warnings", cut(reply.warnings)}, {"decode_ms", answer.decode_ms}};
+    json["size"] = {answer.width, answer.height};
     if (answer.scene)
         json["scene"] = {
             {"bytes", answer.scene->bytes}, {"device_bytes", answer.scene->device_bytes}, {"warnings", cut(answer.scene->warnings)}};
@@ -104,6 +107,8 @@ CallReply reply_from(std::string_view text)
                     .encode_ms = mask.at("encode_ms"),
                     .warnings = mask.at("warnings")};
     for (const Json& stage : mask.at("stages")) answer.reply.stages.push_back({stage.at(0), stage.at(1)});
+    answer.width = json.at("size").at(0);
+    answer.height = json.at("size").at(1);
     if (json.contains("scene")) {
         const Json& scene = json.at("scene");
         answer.scene = SceneFacts{.bytes = scene.at("bytes"), .device_bytes = scene.at("device_bytes"), .warnings = scene.at("warnings")};

@@ -19,6 +19,7 @@ struct Call {
         warm, // check the device and launch every technique
         mask, // of the scene in the body
         keep, // the scene in the body
+        depth, // of the receivers of the scene in the body (depth_view.hpp)
         kept  // a mask of a kept scene
     };
     Kind kind = Kind::mask;
@@ -27,6 +28,7 @@ struct Call {
     std::string patch_form = {}; // the patch's boundary; empty: it is JSON
     MaskChoice choice = {};
     std::string format = {}; // MaskFormat::format
+    int side = 0;            // of a depth view
     double seconds = 0;      // that the request has left
 };
 
@@ -36,13 +38,14 @@ struct SceneFacts {
     std::vector<std::string> warnings = {};
 };
 
-// The file beside it: the mask's bytes.
+// The file beside it: the bytes of the mask, or of the depth view.
 struct CallReply {
     std::optional<Problem> problem = {};
     std::string inside = {}; // of the problem, for the log alone
     MaskReply reply = {};    // its bytes are the file's
     double decode_ms = 0;
     std::optional<SceneFacts> scene = {};
+    int width = 0, height = 0; // of the receivers, with a depth view
 };
 
 // Who a worker is: its first message.

@@ -11,8 +11,10 @@
 #include <penumbra/describe.hpp>
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
+#include <penumbra/image.hpp>
 
 #include "masks/call.hpp"
+#include "masks/depth_view.hpp"
 #include "masks/kept_scene.hpp"
 #include "masks/multipart.hpp"
 #include "masks/scene_store.hpp"
@@ -60,6 +62,8 @@ public:
             return {};
         case Call::Kind::mask:
             return mask(call, shared[0], deadline, bytes);
+        case Call::Kind::depth:
+            return depth(call, shared[0], deadline, bytes);
         case Call::Kind::keep:
             return keep(call, shared[0], deadline);
         case Call::Kind::kept:
@@ -89,6 +93,18 @@ private:
         const auto parts = parts_of(body, call.form);
         const MaskTask task = task_of(parts, call.choice, options_, deadline);
         return computed(call, task, deadline, decoding, bytes);
+    }
+
+    CallReply depth(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    {
+        const Scene scene = decode_scene(parts_of(body, call.form), options_, deadline);
+        const std::vector<std::byte> image = encode_image(depth_view(scene.receivers, call.side), {.format = "pfm", .bits = 32});
+        bytes = shared_copy({reinterpret_cast<const char*>(image.data()), image.size()});
+        CallReply answer;
+        answer.reply.warnings = scene.warnings;
+        answer.width = scene.receivers.width;
+        answer.height = scene.receivers.height;
+        return answer;
     }
 
     std::shared_ptr<KeptScene> scene_of(const Call& call, std::string_view body, const Deadline& deadline)
