@@ -3,6 +3,7 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/shadow_test.clh"
+#include "common/stop.clh"
 
 // shadow_map_taps: taps x taps comparisons around the receiver, equally weighted (percentage-closer filtering, Reeves et al. 1987, without
 // their jitter); taps = 1 is the hard test.
@@ -11,7 +12,7 @@
 __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision, const int has_planes, const int taps,
                               __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
                               __global const float* restrict eta, __global const float* restrict d, __global const float* restrict slope_xi,
-                              __global const float* restrict slope_eta, __global float* restrict visibility)
+                              __global const float* restrict slope_eta, __global float* restrict visibility, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -25,7 +26,7 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
         const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
         const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 0.5f * taps);
         sum = 0.0f;
-        for (int j = 0; j < taps; ++j)
+        for (int j = 0; j < taps && !stopped(stop); ++j)
             for (int i = 0; i < taps; ++i) sum += lit(size, texels, first.x + i, first.y + j, limit);
     }
     visibility[y * receivers.width + x] = sum / (float)(taps * taps);

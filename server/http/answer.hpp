@@ -9,6 +9,7 @@
 #include <httplib.h>
 
 #include <penumbra/error.hpp>
+#include <penumbra/stop.hpp>
 
 #include "http/connection.hpp"
 #include "process/problem.hpp"
@@ -24,6 +25,9 @@ template <class Call> void guarded(httplib::Response& response, Call&& call)
         call();
     } catch (const Problem& problem) {
         answer(response, problem);
+    } catch (const Stopped&) {
+        const Deadline& deadline = Connection::current().request();
+        answer(response, deadline.passed() ? deadline.over() : service_ends());
     } catch (const Error& error) {
         Connection::current().inside = error.what();
         answer(response, problem_from(error));

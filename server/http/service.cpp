@@ -16,6 +16,9 @@
 namespace penumbra::server {
 namespace {
 
+// After the end was asked for: what is under way may end by itself, and answers may leave. Together below a second.
+constexpr std::chrono::milliseconds grace{500}, goodbye{250};
+
 constexpr int backlog = 1024; // connections that the kernel keeps for us; the HTTP library asks for 5
 
 bool is_request_id(std::string_view id)
@@ -80,11 +83,16 @@ Service::Http::Http(Service& service) : service_(service)
     });
 }
 
+void Service::Http::end_by(Deadline::Clock::time_point end)
+{
+    if (Lobby* const lobby = lobby_) lobby->end_by(end);
+}
+
 void Service::Http::lengthen_backlog() { ::listen(svr_sock_, backlog); }
 
 bool Service::Http::process_and_close_socket(socket_t socket)
 {
-    lobby_->arrive(socket);
+    lobby_.load()->arrive(socket);
     return true;
 }
 
@@ -140,6 +148,7 @@ int Service::bind()
 
 void Service::become_ready()
 {
+    const Watch::Guard watched(watch_, Watch::Time::max());
     check_known_mask(engine_);
     warm(engine_);
     warm_ = true;
@@ -152,10 +161,14 @@ void Service::serve()
 
 void Service::drain() { draining_ = true; }
 
+void Service::end_work() { watch_.end_all(Deadline::Clock::now() + grace); }
+
 void Service::stop()
 {
     draining_ = true;
     stopped_ = true;
+    end_work();
+    http_->end_by(Deadline::Clock::now() + grace + goodbye);
     http_->stop();
 }
 

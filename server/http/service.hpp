@@ -15,6 +15,7 @@
 #include "masks/scene_store.hpp"
 #include "process/gate.hpp"
 #include "process/options.hpp"
+#include "process/watch.hpp"
 
 namespace httplib {
 struct Request;
@@ -40,7 +41,9 @@ public:
     void serve();
     // From now on /readyz says 503.
     void drain();
-    // Takes no more connections. May be called from any thread, before serve() too.
+    // What is computed, and getting ready, ends by itself soon or is stopped.
+    void end_work();
+    // Takes no more connections, and ends the work; serve() returns within a second. May be called from any thread, before serve() too.
     void stop();
 
     Gate& gate() { return gate_; }
@@ -78,6 +81,7 @@ private:
     const Engine engine_;
     const Log log_;
     Gate gate_;
+    Watch watch_;
     SceneStore scenes_;
     mutable Metrics metrics_;
     const std::string id_prefix_;

@@ -69,6 +69,7 @@ Body Service::read_body(const Request& request) const
         throw Problem(408, "slow_body",
                       "the body came at less than " + std::to_string(options_.transfer_bytes_s) + " bytes a second, " +
                           std::to_string(transfer_grace.count()) + " s after its begin");
+    if (connection.timed_out() && stopped_) throw service_ends();
     if (connection.timed_out())
         throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
     if (came != length)
@@ -84,6 +85,7 @@ Gate::Guard Service::enter_slot()
 {
     const auto waiting = Deadline::Clock::now();
     Gate::Guard slot = gate_.enter(Connection::current().request());
+    if (watch_.ended()) throw service_ends();
     const double wait_s = seconds_since(waiting);
     Connection::current().cost.queue_ms = wait_s * 1000;
     metrics_.observe("penumbra_queue_wait_seconds", "", wait_s);
@@ -102,6 +104,7 @@ void Service::post_mask(const Request& request, Response& response)
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
+    const auto watched = watch_.until(connection.request());
     const auto decoding = Deadline::Clock::now();
     const MaskTask task = task_of(parts, choice, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;
@@ -121,6 +124,7 @@ void Service::post_scene(const Request& request, Response& response)
     response.status = scene ? 200 : 201;
     if (!scene) {
         const auto slot = enter_slot();
+        const auto watched = watch_.until(connection.request());
         const auto decoding = Deadline::Clock::now();
         scene = std::make_shared<KeptScene>(id, parts, options_, connection.request());
         const MaskTask task = scene->task({}, {}, scene->first_choice(), options_, connection.request());
@@ -153,6 +157,7 @@ void Service::post_kept_mask(const Request& request, Response& response)
     if (tag.is_known(request, response)) return;
 
     const auto slot = enter_slot();
+    const auto watched = watch_.until(connection.request());
     const auto decoding = Deadline::Clock::now();
     const MaskTask task = scene->task(patch, parts, choice, options_, connection.request());
     connection.cost.decode_ms = seconds_since(decoding) * 1000;

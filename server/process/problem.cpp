@@ -29,6 +29,8 @@ Problem problem_from(const Error& error)
 
 Problem defect() { return problem_from(Error(ErrorCode::internal, {})); }
 
+Problem service_ends() { return Problem(503, "ending", "the service is about to end, and this takes longer than it waits; try again", 5); }
+
 std::string_view title_of(int status)
 {
     switch (status) {

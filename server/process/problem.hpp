@@ -27,6 +27,9 @@ Problem problem_from(const Error& error);
 // Any other exception: its text says nothing to the outside.
 Problem defect();
 
+// What was under way when the service was told to end.
+Problem service_ends();
+
 std::string_view title_of(int status);
 std::string json_of(const Problem& problem, std::string_view request_id);
 
