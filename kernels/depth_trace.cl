@@ -168,10 +168,10 @@ __kernel void depth_count(const int first, const int count, const int samples, c
 //
 // Launched over width x height.
 __kernel void depth_view(const DepthView view, const DepthSight sight, __global const DepthPixel* restrict pixels, __global const float* restrict nearest,
-                         __global float* restrict front, __global float* restrict back)
+                         __global float* restrict front, __global float* restrict back, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= sight.width || y >= sight.height) return;
+    if (x >= sight.width || y >= sight.height || stopped(stop)) return;
     const float tx = (2 * x + 1 - sight.width) * 0.5f * sight.pixel_x + sight.off_x, ty = (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y + sight.off_y;
     const float3 eye = sight.orthographic ? (float3)(tx, ty, 0.0f) : (float3)(0.0f);
     const float3 way = sight.orthographic ? (float3)(0.0f, 0.0f, 1.0f) : (float3)(tx, ty, 1.0f);

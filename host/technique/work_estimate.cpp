@@ -15,15 +15,16 @@ std::vector<int> spread_numbers(int columns, int rows, int count)
     return numbers;
 }
 
-ChosenTiles chosen_tiles(opencl::Work& work, const ReceiverPoints& points, const opencl::Specialisation& program)
+int tile_count(const ReceiverView& view) { return view.stride / TILE_WIDTH * (view.rows / tile_rows); }
+
+ChosenTiles chosen_tiles(opencl::Work& work, const ReceiverPoints& points, const opencl::Specialisation& program, int count)
 {
     const int columns = points.view.stride / TILE_WIDTH, rows = points.view.rows / tile_rows;
-    const int all = columns * rows, count = std::min(all, std::clamp(all / 16, 16, 256));
     const std::vector<cl_int> numbers = spread_numbers(columns, rows, count);
     const auto tiles = work.upload(std::span<const cl_int>(numbers), "tiles of a sample");
 
     ChosenTiles chosen{.points = {.view = points.view, .precision = points.precision, .xi = {}, .eta = {}, .d = {}, .slope_xi = {}, .slope_eta = {}, .has_planes = points.has_planes},
-                       .times = static_cast<double>(all) / count};
+                       .times = static_cast<double>(tile_count(points.view)) / count};
     ReceiverPoints& some = chosen.points;
     some.view.width = some.view.stride = TILE_WIDTH;
     some.view.height = some.view.rows = count * tile_rows;

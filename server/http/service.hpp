@@ -37,7 +37,7 @@ public:
     int bind();
     // Checks the device and warms every technique; then /readyz says ready. Throws what they throw.
     void become_ready();
-    // Answers until stop(); returns when what was in flight is done.
+    // Answers until stop(); returns when what was in flight is done or stopped.
     void serve();
     // From now on /readyz says 503.
     void drain();

@@ -211,7 +211,7 @@ std::string help_text()
         out << environment_of(row) << "\n";
     }
     out << "\n  --help, --version, --limits (the table of docs/limits.md)\n\n"
-           "SIGTERM and SIGINT end it when the work in flight is done.\n"
+           "SIGTERM and SIGINT end it: work in flight has half a second after --drain-s, and is then stopped.\n"
            "Exit codes: 0 ended as asked, 1 it could not work, 2 wrong usage.\n";
     return out.str();
 }

@@ -1,4 +1,4 @@
-// Load: many clients at once, an end in the middle of it, deadlines between stages, memory that does not grow.
+// Load: many clients at once, an end in the middle of it, deadlines, memory that does not grow.
 #include <atomic>
 #include <future>
 #include <sstream>

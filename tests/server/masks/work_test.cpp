@@ -134,14 +134,14 @@ TEST(WorkBounds, WhatIsTooMuchIsRefusedOrStopped)
 TEST(WorkBounds, WhatCertainlyDoesNotEndIsRefusedAtOnce)
 {
     server::Options options;
-    options.deadline_s = 3;
+    options.deadline_s = 6;
     const Running running{options};
     const std::string request = expensive().front().request;
     const auto begin = Clock::now();
     const Reply reply = ask(running.port, request);
     EXPECT_EQ(reply.status, 413) << reply.body;
     EXPECT_TRUE(holds(reply.detail(), "receivers.resolution: would take about")) << reply.detail();
-    EXPECT_LT(seconds_since(begin), 2.5);
+    EXPECT_LT(seconds_since(begin), 5);
 }
 
 TEST(WorkBounds, SigtermEndsWhatTakesLonger)
