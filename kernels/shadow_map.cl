@@ -19,14 +19,14 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
     const int at = y * receivers.stride + x;
     const float2 place = place_of(occluders, xi[at], eta[at]);
     float sum = (float)(taps * taps);
-    if (shaded(occluders, place, d[at])) {
+    if (shaded(occluders, place, d[at]) && !stopped(stop)) {
         // The window of texels whose centres lie nearest to the receiver.
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));
         const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
         const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 0.5f * taps);
         sum = 0.0f;
-        for (int j = 0; j < taps && !stopped(stop); ++j)
+        for (int j = 0; j < taps; ++j)
             for (int i = 0; i < taps; ++i) sum += lit(size, texels, first.x + i, first.y + j, limit);
     }
     visibility[y * receivers.width + x] = sum / (float)(taps * taps);
