@@ -10,6 +10,7 @@
 #define CHANNELS 1
 #endif
 #include "common/shared.h"
+#include "common/stop.clh"
 
 // The emission comes as each row's running sum from the left, `sums` [height][width + 1][CHANNELS].
 
@@ -105,10 +106,11 @@ __kernel void border_sums(const int n, const Emission emission, __global const f
 
 // coverage_table: table [n n][n n][CHANNELS], of the first end's place and the second's; shares of the light's whole `total` (1 over each channel's).
 __kernel void coverage_table(const int n, const Emission emission, const float4 per_total, __global const float* restrict sums,
-                             __global const float* restrict border, __global const float* restrict radial, __global float* restrict table)
+                             __global const float* restrict border, __global const float* restrict radial, __global float* restrict table,
+                             __global const volatile int* stop)
 {
     const int second = get_global_id(0), first = get_global_id(1);
-    if (first >= n * n || second >= n * n) return;
+    if (first >= n * n || second >= n * n || stopped(stop)) return;
     const int2 a = steps_of(first, n), b = steps_of(second, n);
     float share[CHANNELS];
     for (int c = 0; c < CHANNELS; ++c) share[c] = 0.0f;

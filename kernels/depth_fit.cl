@@ -3,6 +3,7 @@
 // Images are padded by DEPTH_PAD pixels of nothing on every side, so that windows need no borders: [rows][stride], value 0 where nothing is.
 // Values: see common/depth_walk.h. Launched over width x height, the pixels inside the padding.
 #include "common/shared.h"
+#include "common/stop.clh"
 
 #define DEPTH_PAD 16
 
@@ -29,10 +30,10 @@ inline float smaller_step(const float before, const float here, const float afte
 //   count                        how many pixels it rests on, about
 __kernel void depth_planes(const int2 size, const int stride, const int reach, __global const float* restrict value, __global const float* restrict sigma,
                            __global float* restrict fit, __global float* restrict slope_x, __global float* restrict slope_y,
-                           __global float* restrict residual, __global float* restrict count)
+                           __global float* restrict residual, __global float* restrict count, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= size.x || y >= size.y) return;
+    if (x >= size.x || y >= size.y || stopped(stop)) return;
     const int at = (y + DEPTH_PAD) * stride + x + DEPTH_PAD;
     const float own = value[at], error = sigma[at], per_reach = 0.6f / (reach * reach);
     // Over a wider step where the window is wide: noise bends the first slope less.
@@ -90,10 +91,10 @@ __kernel void depth_creases(const int2 size, const int stride, const int reach, 
                             __global const float* restrict fit, __global const float* restrict slope_x, __global const float* restrict slope_y,
                             __global const float* restrict residual, __global const float* restrict count, __global float* restrict new_fit,
                             __global float* restrict new_slope_x, __global float* restrict new_slope_y, __global float* restrict new_residual,
-                            __global float* restrict new_count)
+                            __global float* restrict new_count, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= size.x || y >= size.y) return;
+    if (x >= size.x || y >= size.y || stopped(stop)) return;
     const int at = (y + DEPTH_PAD) * stride + x + DEPTH_PAD;
     const float own = value[at], error = sigma[at];
     const int crease = own > 0.0f && residual[at] >= 2.0f * error + 1e-7f * own;

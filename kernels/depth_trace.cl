@@ -10,6 +10,7 @@
 #include "common/depth_walk.h"
 #include "common/depth_samples.clh"
 #include "common/depth_bundle.clh"
+#include "common/stop.clh"
 
 // depth_trace: which of the light's samples each receiver does not see.
 //
@@ -22,7 +23,7 @@
 __kernel void depth_trace(const DepthView view, const DepthLight light, const int bounds, __global const DepthPixel* restrict pixels,
                           __global const float* restrict nearest, __global const float* restrict points, __global const float* restrict normals,
                           __global const float2* restrict strata, const float2 step, __global uint* restrict blocked, __global uint* restrict crossed,
-                          __global uint* restrict unknown, __global uint* restrict left)
+                          __global uint* restrict unknown, __global uint* restrict left, __global const volatile int* stop)
 {
     const int item = get_global_id(0);
     if (item >= light.count) return;
@@ -35,7 +36,7 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
     const DepthVector start = {point.x, point.y, point.z};
     uint outside = 0;
 
-    for (int first = 0; first < light.samples; first += 32) {
+    for (int first = 0; first < light.samples && !stopped(stop); first += 32) {
         const int word = (first / 32) * light.count + item;
         uint bits = blocked[word], sure = bounds ? crossed[word] : 0, maybe = bounds ? unknown[word] : 0;
         for (int k = first; k < min(first + 32, light.samples); ++k) {
@@ -72,10 +73,11 @@ __kernel void depth_trace(const DepthView view, const DepthLight light, const in
 // Launched over count receivers x bundles.
 __kernel void depth_trace_bundles(const DepthView view, const DepthLight light, __global const DepthPixel* restrict pixels,
                                   __global const float* restrict nearest, __global const float* restrict points, __global const float* restrict normals,
-                                  __global const float2* restrict strata, const float2 step, __global uint* restrict blocked)
+                                  __global const float2* restrict strata, const float2 step, __global uint* restrict blocked,
+                                  __global const volatile int* stop)
 {
     const int item = get_global_id(0), first = get_global_id(1) * BUNDLE;
-    if (item >= light.count || first >= light.samples) return;
+    if (item >= light.count || first >= light.samples || stopped(stop)) return;
     const int i = light.first + item;
     const float3 given = vload3(i, points);
     if (!(given.z > 0.0f)) return;
@@ -166,10 +168,10 @@ __kernel void depth_count(const int first, const int count, const int samples, c
 //
 // Launched over width x height.
 __kernel void depth_view(const DepthView view, const DepthSight sight, __global const DepthPixel* restrict pixels, __global const float* restrict nearest,
-                         __global float* restrict front, __global float* restrict back)
+                         __global float* restrict front, __global float* restrict back, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= sight.width || y >= sight.height) return;
+    if (x >= sight.width || y >= sight.height || stopped(stop)) return;
     const float tx = (2 * x + 1 - sight.width) * 0.5f * sight.pixel_x + sight.off_x, ty = (sight.height - 2 * y - 1) * 0.5f * sight.pixel_y + sight.off_y;
     const float3 eye = sight.orthographic ? (float3)(tx, ty, 0.0f) : (float3)(0.0f);
     const float3 way = sight.orthographic ? (float3)(0.0f, 0.0f, 1.0f) : (float3)(tx, ty, 1.0f);

@@ -10,6 +10,7 @@
 #include "common/shared.h"
 #include "receivers.cl"
 #include "common/lanes.clh"
+#include "common/stop.clh"
 #include "occlusion_slices.cl"
 #include "occlusion_levels.cl"
 
@@ -62,10 +63,11 @@ __attribute__((always_inline)) inline floatn hidden(const OcclusionLight light, 
 // Launched over work-items, (stride / LANES) x rows.
 __kernel void occlusion_texture(const ReceiverView view, const OcclusionLight light, const int2 size, __global const OcclusionPlane* restrict planes,
                                 __global const OcclusionLevel* restrict levels, __global const element* restrict data, __global const float* restrict xi,
-                                __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility)
+                                __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility,
+                                __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1);
-    if (x >= view.width || y >= view.height) return;
+    if (x >= view.width || y >= view.height || stopped(stop)) return;
     const int at = y * view.stride + x;
     const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
     const Seen p = seen_at(light, xi + at, eta + at, d + at);

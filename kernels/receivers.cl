@@ -137,6 +137,30 @@ __kernel void tile_bounds(const ReceiverView view, const float nearest, const fl
         (float8)(least(xi_low), -least(-xi_high), least(eta_low), -least(-eta_high), least(d_low), -least(-d_high), total(there), total(uncovered));
 }
 
+// chosen_tiles: some tiles of the receivers, one below the other, as lists of their own.
+//
+//   tiles [count]   numbers of tiles, row by row
+//
+// Launched over TILE_WIDTH x (count TILE_ROWS).
+__kernel void chosen_tiles(const ReceiverView view, __global const int* restrict tiles, const int count, const int has_planes,
+                           __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
+                           __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict to_xi,
+                           __global float* restrict to_eta, __global float* restrict to_d, __global float* restrict to_slope_xi,
+                           __global float* restrict to_slope_eta)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= TILE_WIDTH || y >= count * TILE_ROWS) return;
+    const int tiles_x = view.stride / TILE_WIDTH, tile = tiles[y / TILE_ROWS];
+    const int from = ((tile / tiles_x) * TILE_ROWS + y % TILE_ROWS) * view.stride + (tile % tiles_x) * TILE_WIDTH + x;
+    const int to = y * TILE_WIDTH + x;
+    to_xi[to] = xi[from];
+    to_eta[to] = eta[from];
+    to_d[to] = d[from];
+    if (!has_planes) return;
+    to_slope_xi[to] = slope_xi[from];
+    to_slope_eta[to] = slope_eta[from];
+}
+
 // sample_mask: a light-space mask seen from the receivers (Soft Shadow Maps, 3.1: "projected onto the scene").
 //
 //   mask [mask_size.y][mask_size.x]  visibility over the light's view, row 0 at the top

@@ -3,6 +3,7 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/shadow_test.clh"
+#include "common/stop.clh"
 
 // shadow_map_taps: taps x taps comparisons around the receiver, equally weighted (percentage-closer filtering, Reeves et al. 1987, without
 // their jitter); taps = 1 is the hard test.
@@ -11,14 +12,14 @@
 __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision, const int has_planes, const int taps,
                               __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
                               __global const float* restrict eta, __global const float* restrict d, __global const float* restrict slope_xi,
-                              __global const float* restrict slope_eta, __global float* restrict visibility)
+                              __global const float* restrict slope_eta, __global float* restrict visibility, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
     const int at = y * receivers.stride + x;
     const float2 place = place_of(occluders, xi[at], eta[at]);
     float sum = (float)(taps * taps);
-    if (shaded(occluders, place, d[at])) {
+    if (shaded(occluders, place, d[at]) && !stopped(stop)) {
         // The window of texels whose centres lie nearest to the receiver.
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));

@@ -13,6 +13,7 @@
 #include "common/shadow_test.clh"
 #include "common/bits.clh"
 #include "common/lanes.clh"
+#include "common/stop.clh"
 
 #define BUFFER_ROWS 8 // of texels, that a work-item owns
 
@@ -124,12 +125,15 @@ inline void store_texels(__global float* to, const floatn values, const int left
 //   nearest, furthest            disparities of the nearest and the furthest receiver, as bits
 //   distances, depths [height][width]   from the silhouette; disparity 0 where there is no smoothie
 //   inner_distances, inner_depths   two_sided: distance from the silhouette on its inner side (negative: none), and its disparity
+//   evaluated                    edges that were evaluated against the texels of each work-item
+//   stop                         common/stop.clh, asked between every 16 groups
 //
 // Launched over work-items, (width / LANES) x (height / BUFFER_ROWS), both rounded up.
 __kernel void smoothie_buffer(const SmoothieView view, __global const float* restrict boxes, __global const float* restrict edge_boxes,
                               __global const float* restrict edges, __global const float2* restrict texels, __global const int* restrict nearest,
                               __global const int* restrict furthest, __global float* restrict distances, __global float* restrict depths,
-                              __global float* restrict inner_distances, __global float* restrict inner_depths)
+                              __global float* restrict inner_distances, __global float* restrict inner_depths, __global uint* restrict evaluated,
+                              __global const volatile int* stop)
 {
     const int first_x = get_global_id(0) * LANES, first_y = get_global_id(1) * BUFFER_ROWS;
     if (first_x >= view.width || first_y >= view.height) return;
@@ -167,13 +171,16 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
     const float x0 = columns[0], x1 = columns[LANES - 1];
     const float y1 = view.top - first_y * view.step_y, y0 = view.top - (first_y + BUFFER_ROWS - 1) * view.step_y;
 
+    uint count = 0;
     for (int block = 0; block < view.groups; block += 16) {
+        if (stopped(stop)) return;
         uint group_bits = bits_of(reach(view, boxes + block * 5, x0, x1, y0, y1, far[0]));
         while (group_bits) {
             const int group = block + take_bit(&group_bits);
             uint bits = bits_of(reach(view, edge_boxes + group * 80, x0, x1, y0, y1, far[0]));
             while (bits) {
                 __global const float* edge = edges + (group * SMOOTHIE_GROUP + take_bit(&bits)) * 8;
+                ++count;
                 for (int row = 0; row < BUFFER_ROWS; ++row) {
                     const floatn y = (floatn)(view.top - (first_y + row) * view.step_y);
                     const Nearest n = nearest_of(edge, x, y);
@@ -197,6 +204,7 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
             }
         }
     }
+    evaluated[get_global_id(1) * ((view.width + LANES - 1) / LANES) + get_global_id(0)] = count;
     for (int row = 0; row < BUFFER_ROWS && first_y + row < view.height; ++row) {
         const int at = (first_y + row) * view.width + first_x, left = view.width - first_x;
         store_texels(distances + at, distance[row], left);

@@ -15,6 +15,7 @@
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"
 #include "common/own_surface.clh"
+#include "common/stop.clh"
 
 // From which disparity on an occluder counts for a receiver whose own plane is not known: d + bias.
 //
@@ -182,6 +183,7 @@ inline void write_visibility(__global float* to, const floatn seen, const int le
 //   has_planes, slope_xi, slope_eta   the receivers' own planes (receiver_planes), where they are known
 //   visibility [height][width]  1 - occlusion, 0 to 1. With `merge` the smaller of that and what is there (3.5: the larger occlusion of two maps)
 //   evaluated [tiles]           texels that were evaluated against the tile's receivers, added to what is there with `merge`
+//   stop                        common/stop.clh, asked between superblocks
 //
 // Launched over work-items, (stride / LANES) x (rows / ITEM_ROWS). Texels are added in one order, whatever the tile, so the same receiver
 // gets the same bits under any tiling.
@@ -190,7 +192,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                               __global const float* restrict blocks, __global const float* restrict superblocks, __global const float8* restrict bounds,
                               __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
                               __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
-                              __global uint* restrict evaluated)
+                              __global uint* restrict evaluated, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= receivers.stride || y >= receivers.rows) return;
@@ -211,6 +213,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
     for (int s = supers.y * super_count.x; s < supers.w * super_count.x; ++s) {
         const int2 super = (int2)(s % super_count.x, s / super_count.x);
         if (super.x < supers.x || super.x >= supers.z) continue;
+        if (stopped(stop)) return;
         const int2 low = super * BLOCK;
         const int4 inside = window(search, superblocks[s], search.texel * BLOCK, low, min(low + BLOCK, block_count));
         for (int by = inside.y; by < inside.w; ++by)

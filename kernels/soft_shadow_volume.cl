@@ -22,6 +22,7 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/lanes.clh"
+#include "common/stop.clh"
 #include "coverage_table.cl"
 
 // LANES receivers.
@@ -236,6 +237,7 @@ inline void write_visibility(__global float* to, const floatn seen, const int le
 //   visibility [height][width][CHANNELS]      share of the light that is seen, 0 to 1
 //   coverage, coverage_size                   linear: the wedges' planes; texture: the table and its n; else nothing
 //   evaluated [tiles][2]                      edges, and triangles, that were evaluated against the tile's receivers; added to with further parts
+//   stop                                      common/stop.clh, asked between every 16 groups
 //
 // `eye`: with w 1, the receivers' camera in light space (tangents in half extents, disparity): tiles are then bounded by it and by their furthest receivers,
 // which is what one depth a tile can tell (Paper II, section 4, for comparison).
@@ -247,7 +249,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                                  __global const float* restrict triangle_extents, __global const float* restrict triangles,
                                  __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
                                  __global const float* restrict d, __global float* restrict visibility, __global uint2* restrict evaluated, __global const float* restrict coverage,
-                                 const int coverage_size)
+                                 const int coverage_size, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= view.stride || y >= view.rows) return;
@@ -274,6 +276,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
                 for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[channel][row]);
 
             for (int groups = sheet.triangles_begin & ~15; groups < sheet.triangles_end; groups += 16) {
+                if (stopped(stop)) return;
                 uint group_bits = chosen(tile, triangle_boxes + groups * 5, light.culling, 0.0f, sheet.triangles_begin - groups, sheet.triangles_end - groups);
                 while (group_bits) {
                     const int group = groups + take_bit(&group_bits);
@@ -295,6 +298,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
             }
 
             for (int groups = sheet.edges_begin & ~15; groups < sheet.edges_end; groups += 16) {
+                if (stopped(stop)) return;
                 uint group_bits = chosen(tile, edge_boxes + groups * 5, light.culling, 1.0f, sheet.edges_begin - groups, sheet.edges_end - groups);
                 while (group_bits) {
                     const int group = groups + take_bit(&group_bits);

@@ -99,6 +99,13 @@ int serve(const Options& options, const Environment& environment)
             tell(notifier, "READY=1\nSTATUS=ready on " + options.host + " port " + std::to_string(port));
             watchdog.emplace(
                 notifier, [&](auto within) { return service.works() && answers_health(options.host, port, within); }, say);
+        } catch (const Problem& problem) {
+            // Told to end before it was ready, or a failure.
+            if (problem.reason != service_ends().reason) {
+                failure = std::current_exception();
+                failed = true;
+                kill(getpid(), SIGTERM);
+            }
         } catch (...) {
             failure = std::current_exception();
             failed = true;
@@ -108,13 +115,14 @@ int serve(const Options& options, const Environment& environment)
     std::jthread answering([&] { service.serve(); });
 
     wait_for_signal(signals, nullptr);
-    say("ending: work in flight is being finished");
+    say("ending: work in flight is being finished, or stopped");
     tell(notifier, failed ? "STOPPING=1\nSTATUS=could not get ready" : "STOPPING=1\nSTATUS=finishing work in flight");
     service.drain();
     if (options.drain_s > 0) {
         const timespec time{options.drain_s, 0};
         wait_for_signal(signals, &time); // a second signal shortens it
     }
+    service.end_work();
     getting_ready.join();
     watchdog.reset(); // from here on nobody is answered
     service.stop();

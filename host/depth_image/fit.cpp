@@ -6,6 +6,7 @@
 
 #include "depth_image/edges.hpp"
 #include "scene/parallel.hpp"
+#include "scene/stop.hpp"
 
 namespace penumbra {
 namespace {
@@ -37,11 +38,13 @@ double relative_noise(const std::vector<float>& value, int width, int height)
             second.push_back(std::abs((value[before] - value[here]) + (value[after] - value[here])) / value[here]);
     };
     const int margin_x = width > 8 ? 2 : 0, margin_y = height > 8 ? 2 : 0;
-    for (int y = margin_y; y < height - margin_y; ++y)
+    for (int y = margin_y; y < height - margin_y; ++y) {
+        check_stop();
         for (int x = margin_x; x < width - margin_x; ++x) {
             if (x > 0 && x + 1 < width) take(at(x - 1, y), at(x, y), at(x + 1, y));
             if (y > 0 && y + 1 < height) take(at(x, y - 1), at(x, y), at(x, y + 1));
         }
+    }
     constexpr double least = 3e-8; // of float32's own rounding
     if (second.empty()) return least;
     const auto middle = second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2);
@@ -105,9 +108,9 @@ void fit_planes(opencl::Work& work, DepthFit& fit, const std::vector<float>& val
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(fit.width), static_cast<std::size_t>(fit.height)};
     const std::uint64_t bytes = value.size() * sizeof(float);
     work.launch(depth_fit_program(), "depth_planes", grid, {16, 8}, 7 * bytes, size, static_cast<cl_int>(stride), reach, on_device, errors,
-                first[0], first[1], first[2], first[3], first[4]);
+                first[0], first[1], first[2], first[3], first[4], work.stop());
     work.launch(depth_fit_program(), "depth_creases", grid, {16, 8}, 12 * bytes, size, static_cast<cl_int>(stride), reach, on_device, errors,
-                first[0], first[1], first[2], first[3], first[4], second[0], second[1], second[2], second[3], second[4]);
+                first[0], first[1], first[2], first[3], first[4], second[0], second[1], second[2], second[3], second[4], work.stop());
     std::vector<float>* const results[] = {&fit.value, &fit.slope_x, &fit.slope_y, &fit.residual, &fit.count};
     for (std::size_t i = 0; i < 5; ++i) *results[i] = unpadded(work.read(second[i]), fit.width, fit.height, stride);
 }
@@ -117,6 +120,7 @@ std::vector<std::uint8_t> use_planes(DepthFit& fit, const std::vector<float>& me
 {
     std::vector<std::uint8_t> stray(measured.size());
     for (std::size_t i = 0; i < measured.size(); ++i) {
+        if (i % 65536 == 0) check_stop();
         if (!fit.there[i]) {
             fit.value[i] = 0;
             continue;
@@ -228,22 +232,29 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     fit.quality.pixels = static_cast<std::uint64_t>(std::count(fit.there.begin(), fit.there.end(), 1));
     std::vector<float> quanta;
     std::vector<float> quantum(count);
-    for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t i = 0; i < count; ++i) {
+        if (i % 65536 == 0) check_stop();
         if (fit.there[i]) {
             quantum[i] = static_cast<float>(step_at(depth.step, depth.depth[i], fit.orthographic) / std::sqrt(12.));
             quanta.push_back(quantum[i] / measured[i]);
         }
+    }
     const auto measure = [&] {
         const double noise = depth.noise > 0 ? std::max(depth.noise, 3e-8) : relative_noise(measured, fit.width, fit.height);
         fit.quality.noise = noise;
-        for (std::size_t i = 0; i < count; ++i) fit.sigma[i] = std::hypot(static_cast<float>(noise) * measured[i], quantum[i]);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (i % 65536 == 0) check_stop();
+            fit.sigma[i] = std::hypot(static_cast<float>(noise) * measured[i], quantum[i]);
+        }
     };
     measure();
+    check_stop();
 
     // Edges: steps, means of both sides, or ramps.
     const ValueImage image{fit.width, fit.height, measured, fit.sigma};
     Between between = between_two_surfaces(image);
     const std::vector<std::uint8_t> ramp = ramps(image, ramp_width);
+    check_stop();
     fit.quality.edge_share = between.share();
     fit.quality.smeared = is_smeared(image, ramp, between.seen_steps);
     fit.quality.antialiased = !fit.quality.smeared && between.share() >= .15;
@@ -261,14 +272,17 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     for (const std::uint8_t one : fit.mixed) fit.quality.between += one;
 
     // Planes.
+    check_stop();
     const double quantum_size = median_of(std::move(quanta));
     fit.quality.step = quantum_size * std::sqrt(12.);
     const double sure = std::max(fit.quality.noise, quantum_size);
     const double pixel = fit.orthographic ? fit.pixel_y / std::max(fit.far, 1e-30) : fit.pixel_y;
     fit.quality.reach = reach_for(sure, pixel);
+    check_stop();
     fit_planes(work, fit, measured);
     const DepthFit planes = fit;
     const std::vector<std::uint8_t> stray = use_planes(fit, measured);
+    check_stop();
     place_mixed(fit, planes, between);
     std::vector<std::uint8_t> good(count);
     for (std::size_t i = 0; i < count; ++i) good[i] = fit.there[i] && !stray[i] && !fit.mixed[i];

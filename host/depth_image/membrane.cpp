@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "depth_image/thickness.hpp"
+#include "scene/stop.hpp"
 
 namespace penumbra {
 namespace {
@@ -159,6 +160,7 @@ Numbers solve(const std::vector<Graph>& levels, const Numbers& right)
     const double whole = dot(rest, rest);
     double last = 0;
     for (int turn = 0; turn < 60; ++turn) {
+        check_stop();
         if (!(dot(rest, rest) > 1e-10 * whole)) break;
         cycle(levels, 0, cycled, rest);
         const double now = dot(rest, cycled);

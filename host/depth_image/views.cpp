@@ -33,7 +33,7 @@ void add_view(opencl::Work& work, const DepthImage& image, const Camera& camera,
     const auto nearest = work.upload(std::span<const float>(image.nearest), "depth image's pyramid");
     const auto fronts = work.upload(std::span<const float>(front.depth), "front depth"), backs = work.upload(std::span<const float>(back.depth), "back depth");
     work.launch(depth_trace_program(work.context().quirks().lanes), "depth_view", {static_cast<std::size_t>(front.width), static_cast<std::size_t>(front.height)}, {16, 8},
-                pixels.bytes() + 2 * fronts.bytes(), image.view, sight, pixels, nearest, fronts, backs);
+                pixels.bytes() + 2 * fronts.bytes(), image.view, sight, pixels, nearest, fronts, backs, work.stop());
     front.depth = work.read(fronts);
     back.depth = work.read(backs);
     front.precision = back.precision = std::max(front.precision, image.quality.noise);

@@ -41,7 +41,7 @@ private:
 class MaskRun {
 public:
     MaskRun(const Engine& engine, const MaskJob& job, const MaskHooks& hooks)
-        : engine_(engine), job_(job), keeper_(hooks.keeper ? *hooks.keeper : own_keeper_), before_(hooks.before), masks_(job.lights.size())
+        : engine_(engine), job_(job), keeper_(hooks.keeper ? *hooks.keeper : own_keeper_), before_(hooks.before), estimated_(hooks.estimated), masks_(job.lights.size())
     {
     }
 
@@ -136,7 +136,7 @@ private:
         std::vector<Stage> stages;
         const Receivers& seen = receivers(job_.lights[index].light, made.state().device, stages);
         before("shading");
-        Mask mask = engine_.shade(made, seen, job_.bound);
+        Mask mask = shade_estimated(made, seen, job_.bound, estimated_);
         Report& report = mask.report;
         if (!kept) {
             add_stages(stages, made.state().stages);
@@ -165,6 +165,7 @@ private:
     FrameKeeper own_keeper_;
     MaskKeeper& keeper_;
     const std::function<void(std::string_view)>& before_;
+    const std::function<void(const WorkAmount&)>& estimated_;
     std::vector<std::optional<Mask>> masks_; // of lights that stay the same while others move
     std::shared_ptr<const Receivers> receivers_;
 };
@@ -252,11 +253,27 @@ MaskJob job_of(Scene&& scene, const Technique& technique)
             .combined = combined};
 }
 
+namespace {
+
+// Three a triangle, of objects that cast, or of the sheets that depth maps show.
+double edges_of(const MaskJob& job, const MaskShape& shape)
+{
+    double triangles = 0;
+    for (const Object& object : job.geometry.objects())
+        if (object.casts) triangles += object.seen ? 4 * static_cast<double>(object.seen->depth.depth.size()) : static_cast<double>(object.mesh.triangles.size());
+    if (triangles == 0)
+        for (const MaskShape::Map& map : shape.occluders) triangles = std::max(triangles, 4.0 * map.width * map.height);
+    return 3 * triangles;
+}
+
+} // namespace
+
 std::vector<WorkAmount> work_of(const MaskJob& job)
 {
     MaskShape shape{.receivers = {job.receivers->width, job.receivers->height}, .occluders = {}};
     for (const MaskLight& light : job.lights) shape.occluders.push_back({light.occluders->width, light.occluders->height});
     shape.bound = job.bound;
+    shape.edges = edges_of(job, shape);
     return std::visit([&](const auto& settings) { return work(settings, shape); }, job.technique);
 }
 

@@ -143,7 +143,9 @@ void require_bounds(const Technique& technique)
         throw Error(ErrorCode::unsupported, kind_of(technique) + " has no bounds", "depth_trace and ray_traced have");
 }
 
-Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bound) const
+Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bound) const { return shade_estimated(prepared, receivers, bound, {}); }
+
+Mask shade_estimated(const Prepared& prepared, const Receivers& receivers, bool bound, const std::function<void(const WorkAmount&)>& estimated)
 {
     const Prepared::State& state = prepared.state();
     if (bound) require_bounds(state.technique);
@@ -190,7 +192,7 @@ Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bo
                                           "what casts on these");
     warn_of_dark_side(state.light, receivers, camera, mask.report);
     ShadeCounts counts;
-    Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .bound = bound ? &mask.bound : nullptr};
+    Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .estimated = estimated, .bound = bound ? &mask.bound : nullptr};
     shade_technique(work, state, receiving, shaded);
     if (normals && visibility) clip(work, state, receiving, visibility.memory());
     mask.visibility = image_of(work, state, receivers, visibility, shaded);
@@ -226,7 +228,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .normals = nullptr,
                               .view = state.light_view,
                               .from_light = {}};
-    Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr, .bound = nullptr};
+    Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr, .estimated = {}, .bound = nullptr};
     shade_technique(work, state, receiving, shaded);
     work.finish();
 }

@@ -47,6 +47,9 @@ struct Prepared::State {
 // Throws unsupported when the technique does not take this light.
 void check_light(const Light& light, const Technique& technique);
 
+// Engine::shade; `estimated`: MaskHooks::estimated.
+Mask shade_estimated(const Prepared& prepared, const Receivers& receivers, bool bound, const std::function<void(const WorkAmount&)>& estimated);
+
 // Throws unsupported for a technique that has no bounds.
 void require_bounds(const Technique& technique);
 

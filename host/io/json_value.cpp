@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <set>
+#include <utility>
 
 namespace penumbra {
 
@@ -11,7 +11,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int max_depth = 32;
+constexpr std::size_t max_depth = 32;
 
 bool is_plain(std::string_view name)
 {
@@ -61,37 +61,79 @@ std::string in_quotes(std::string_view text)
     return json(text.substr(0, 80)).dump(-1, ' ', true, json::error_handler_t::replace) + (cut ? "..." : "");
 }
 
-json parse_json(std::string_view text)
-{
-    // The parser keeps the last of equal keys without a word, so the keys of each open object are remembered here.
-    std::vector<std::set<std::string>> open;
-    const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-        switch (event) {
-        case json::parse_event_t::object_start:
-            open.emplace_back();
-            [[fallthrough]];
-        case json::parse_event_t::array_start:
-            if (depth >= max_depth) throw Error(ErrorCode::invalid_input, "is nested deeper than " + std::to_string(max_depth) + " levels");
-            break;
-        case json::parse_event_t::object_end:
-            open.pop_back();
-            break;
-        case json::parse_event_t::key: {
-            const std::string& key = parsed.get_ref<const std::string&>();
-            if (!open.back().insert(key).second)
-                throw Error(ErrorCode::invalid_input, "the key " + in_quotes(key) + " stands twice in one object");
-            break;
-        }
-        default:
-            break;
-        }
+namespace {
+
+// Makes a document of what the parser meets. The parser's own way of asking about each value looks at all elements of an array for every
+// object in it.
+class DocumentMaker final : public json::json_sax_t {
+public:
+    json take() { return std::move(root_); }
+
+    bool null() override { return add(nullptr); }
+    bool boolean(bool value) override { return add(value); }
+    bool number_integer(std::int64_t value) override { return add(value); }
+    bool number_unsigned(std::uint64_t value) override { return add(value); }
+    bool number_float(double value, const std::string&) override { return add(value); }
+    bool string(std::string& value) override { return add(std::move(value)); }
+    bool binary(json::binary_t& value) override { return add(std::move(value)); }
+    bool start_object(std::size_t) override { return open(json::object()); }
+    bool start_array(std::size_t) override { return open(json::array()); }
+    bool end_object() override { return close(); }
+    bool end_array() override { return close(); }
+
+    // The parser would keep the last of equal keys without a word.
+    bool key(std::string& name) override
+    {
+        auto& members = open_.back()->get_ref<json::object_t&>();
+        const auto [place, added] = members.emplace(name, nullptr);
+        if (!added) throw Error(ErrorCode::invalid_input, "the key " + in_quotes(name) + " stands twice in one object");
+        member_ = &place->second;
         return true;
-    };
-    try {
-        return json::parse(text, watch);
-    } catch (const json::exception& error) {
+    }
+    bool parse_error(std::size_t, const std::string&, const json::exception& error) override
+    {
         throw Error(ErrorCode::invalid_input, "is not JSON: " + plain(error.what()));
     }
+
+private:
+    // Where the next value goes. Elements stay where they are while one of them is open: nothing else is added to its array.
+    json& place()
+    {
+        if (open_.empty()) return root_;
+        if (open_.back()->is_array()) return open_.back()->emplace_back();
+        return *member_;
+    }
+    template <class Value> bool add(Value&& value)
+    {
+        place() = std::forward<Value>(value);
+        return true;
+    }
+    bool open(json value)
+    {
+        if (open_.size() >= max_depth) throw Error(ErrorCode::invalid_input, "is nested deeper than " + std::to_string(max_depth) + " levels");
+        json& at = place();
+        at = std::move(value);
+        open_.push_back(&at);
+        return true;
+    }
+    bool close()
+    {
+        open_.pop_back();
+        return true;
+    }
+
+    json root_;
+    std::vector<json*> open_;
+    json* member_ = nullptr; // whose key came last
+};
+
+} // namespace
+
+json parse_json(std::string_view text)
+{
+    DocumentMaker maker;
+    json::sax_parse(text, &maker);
+    return maker.take();
 }
 
 Error JsonValue::error(const std::string& message, std::string hint) const

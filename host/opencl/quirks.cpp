@@ -104,9 +104,11 @@ bool is_pocl(std::string_view platform) { return platform.find("Portable Computi
 Quirks quirks_of(const cl::Device& device)
 {
     Quirks quirks;
-    if (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) quirks.lanes = 16;
+    const bool processor = (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) != 0;
+    if (processor) quirks.lanes = 16;
     const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
     quirks.driver_cache = is_pocl(platform.getInfo<CL_PLATFORM_NAME>());
+    quirks.host_memory = processor && quirks.driver_cache;
     quirks.keep_binaries = !quirks.driver_cache;
     quirks.system_linker = quirks.driver_cache && platform.getInfo<CL_PLATFORM_VERSION>().find("+debian") != std::string::npos;
     return quirks;

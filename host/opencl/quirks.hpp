@@ -16,6 +16,8 @@ struct Quirks {
     // Receivers that one work-item owns. 16 on CPU devices (PoCL does not vectorise loops that accumulate floats across work-items, so the
     // kernels hold the lanes themselves), 1 on GPUs (the hardware does).
     int lanes = 1;
+    // Kernels read the host's memory as it is now: a word that the host writes while they run is seen (penumbra/stop.hpp).
+    bool host_memory = false;
     // Whether built programs are kept on disk as binaries. Not with PoCL, which has a cache of its own. A process that builds 4 programs
     // and launches their 13 kernels, from main() to the last launch, on a 2-core EPYC under a load of 4, median of 4 (cold) and 8 (warm):
     //     without  cold 3.3 s   warm 0.25 s

@@ -137,6 +137,30 @@ Work::Work(std::shared_ptr<const Context> context, cl_command_queue queue) : con
     });
 }
 
+Work::StopBuffer::~StopBuffer()
+{
+    try {
+        queue.finish();
+    } catch (...) {
+        // A queue that cannot be waited for runs nothing more.
+    }
+}
+
+cl::Buffer Work::stop()
+{
+    if (!stop_ || !own_queue_ || !context().quirks().host_memory) return {};
+    if (!stop_buffer_) {
+        static_assert(sizeof(stop_->asked) == sizeof(cl_int));
+        translated("the word that stops kernels", [&] {
+            cl::Buffer memory(context_->context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, sizeof(StopWord), stop_.get());
+            stop_buffer_ = std::make_unique<StopBuffer>(stop_, std::move(memory), queue_);
+        });
+    }
+    return stop_buffer_->memory;
+}
+
+void Work::check_stop() const { penumbra::check_stop(stop_.get()); }
+
 std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes, const char* what)
 {
     // The room that an empty buffer gets: one element of the largest type, a double16.
@@ -194,6 +218,7 @@ void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes)
     translated("reading back " + bytes_text(bytes), [&] {
         if (bytes > 0) queue_.enqueueReadBuffer(memory, CL_TRUE, 0, bytes, data, nullptr, new_event());
         stages_[current_].bytes += bytes;
+        check_stop();
         if (!context_->canaries) return;
         if (const auto guarded = context_->ledger()->watched(memory)) {
             if (const auto violation = canary_violation(queue_, *guarded)) throw Error(ErrorCode::internal, *violation);
@@ -205,6 +230,7 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
                    std::uint64_t bytes)
 {
     open();
+    check_stop();
     const std::array<std::size_t, 2> whole = whole_groups(name, global, local);
     if (global[0] == 0 || global[1] == 0) return;
     ensure_stage();
@@ -294,6 +320,7 @@ void Work::end_stage()
 std::vector<Stage> Work::finish()
 {
     end_stage();
+    check_stop();
     add_device_times();
     check_canaries();
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "opencl/context.hpp"
+#include "scene/stop.hpp"
 
 namespace penumbra::opencl {
 
@@ -109,12 +110,21 @@ public:
     // under way or not profiled. With canaries: Error(internal) when any buffer's guard tail was written to.
     std::vector<Stage> finish();
 
+    // For kernels that may take long: an int that is not 0 when they are to leave out what they have not begun (common/stop.clh). A null
+    // buffer where nobody can stop this work, or the device would not see it.
+    cl::Buffer stop();
+
+    // What building programs took since the last finish().
+    double compile_ms() const { return total_compile_ms_ + compile_ms_; }
+
     MemoryMeter& memory() { return *memory_; }
     // Adds to another meter's account what stays alive (prepared state that this work builds upon).
     std::shared_ptr<MemoryMeter> memory_ptr() const { return memory_; }
 
 private:
     void open(); // the device, where that waited
+    // Throws Stopped: what kernels left out is not there.
+    void check_stop() const;
     std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes);
@@ -147,6 +157,15 @@ private:
     std::shared_ptr<const Context> context_;  // null: nothing needed the device so far
     cl::CommandQueue queue_;
     bool own_queue_ = true, profiled_ = true;
+    // The word as the device reads it, until nothing runs that may.
+    struct StopBuffer {
+        std::shared_ptr<StopWord> word;
+        cl::Buffer memory;
+        cl::CommandQueue queue;
+        ~StopBuffer();
+    };
+    std::shared_ptr<StopWord> stop_ = current_stop();
+    std::unique_ptr<StopBuffer> stop_buffer_;
     std::shared_ptr<MemoryMeter> memory_ = std::make_shared<MemoryMeter>();
     double compile_ms_ = 0, total_compile_ms_ = 0;
     std::vector<Stage> stages_;

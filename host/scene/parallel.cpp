@@ -15,6 +15,8 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/stop.hpp"
+
 namespace penumbra {
 
 unsigned processor_count()
@@ -52,11 +54,14 @@ void parallel_for(int count, const std::function<void(int)>& body)
     std::atomic<int> next{0};
     std::mutex guard;
     std::exception_ptr first;
+    const std::shared_ptr<StopWord> stop = current_stop();
 
     // Every thread takes the next index until none is left or one of them has failed.
     const auto work = [&] {
+        const StopScope scope(stop);
         for (int i = next.fetch_add(1); i < count; i = next.fetch_add(1)) {
             try {
+                check_stop(stop.get());
                 body(i);
             } catch (...) {
                 const std::lock_guard lock(guard);

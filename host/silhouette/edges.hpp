@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "scene/stop.hpp"
 #include "silhouette/silhouette.hpp"
 
 namespace penumbra {
@@ -17,6 +18,7 @@ template <class F> void for_each_edge(std::span<const Topology::EdgeUse> uses, F
     for (std::size_t begin = 0; begin < uses.size();) {
         std::size_t end = begin + 1;
         while (end < uses.size() && uses[end].low == uses[begin].low && uses[end].high == uses[begin].high) ++end;
+        if (begin / 4096 != end / 4096) check_stop();
         f(uses.subspan(begin, end - begin));
         begin = end;
     }

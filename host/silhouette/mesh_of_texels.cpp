@@ -6,6 +6,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/camera.hpp"
+#include "scene/stop.hpp"
 #include "silhouette/silhouette.hpp"
 
 namespace penumbra {
@@ -21,9 +22,11 @@ public:
         const auto join = [&](int x, int y, int dx, int dy) {
             return joined(value(x - dx, y - dy), value(x, y), value(x + dx, y + dy), value(x + 2 * dx, y + 2 * dy), map.precision);
         };
-        for (int y = 0; y < map.height; ++y)
+        for (int y = 0; y < map.height; ++y) {
+            check_stop();
             for (int x = 0; x < map.width; ++x)
                 joins_[index(x, y)] = static_cast<std::uint8_t>((join(x, y, 1, 0) ? to_right : 0) | (join(x, y, 0, 1) ? to_below : 0));
+        }
     }
 
     bool inside(int x, int y) const { return x >= 0 && y >= 0 && x < map_.width && y < map_.height; }

@@ -161,6 +161,7 @@ Topology::Topology(std::span<const TriangleMesh* const> meshes)
 
     // Keep what has an area, each place once a mesh.
     for (const TriangleMesh* mesh : meshes) {
+        check_stop();
         Welder weld(vertices_, mesh->positions.size());
         for (const Triangle& t : mesh->triangles) {
             const Imath::V3f &a = mesh->positions[t[0]], &b = mesh->positions[t[1]], &c = mesh->positions[t[2]];

@@ -116,7 +116,7 @@ opencl::Buffer<float> coverage_table(opencl::Work& work, const opencl::Specialis
     work.launch(program, "border_sums", {places, 1}, {64, 1}, uploaded.bytes(), static_cast<cl_int>(n), part.window, uploaded, border,
                 radial);
     work.launch(program, "coverage_table", {places, places}, {64, 1}, table.bytes(), static_cast<cl_int>(n), part.window, per_total,
-                uploaded, border, radial, table);
+                uploaded, border, radial, table, work.stop());
     return table;
 }
 

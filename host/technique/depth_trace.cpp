@@ -9,10 +9,16 @@
 #include "depth_image/light.hpp"
 #include "depth_image/views.hpp"
 #include "technique/keys.hpp"
+#include "technique/work_estimate.hpp"
 #include "trace/light_samples.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr WorkKind rays{"technique.samples", WorkAmount::Unit::rays, "rays"};
+
+// Rays for the bound do not end at what blocks them and go one by one, not in bundles: each took 14 to 21 times as long as one for the mask.
+int rays_a_sample(bool bound) { return bound ? 16 : 1; }
 
 // Receivers of one launch: their samples' bits stay within 64 MiB.
 constexpr std::size_t most_words = std::size_t{1} << 24;
@@ -88,7 +94,7 @@ Followed follow(opencl::Work& work, const PreparedDepthTrace& prepared, const Re
         light.key_first = static_cast<int>(key_first);
         work.launch(depth_trace_program(work.context().quirks().lanes), "depth_trace", {points.size(), 1}, {64, 1}, points.size() * 24, image.view,
                     light, cl_int{1}, image.pixels, image.nearest, followed.points, on_normals, prepared.strata, prepared.step, followed.blocked,
-                    followed.crossed, followed.unknown, followed.left);
+                    followed.crossed, followed.unknown, followed.left, work.stop());
     }
     return followed;
 }
@@ -194,6 +200,9 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
     opencl::Buffer<DepthVector> normals;
     if (receivers.surface) normals = work.upload(std::span<const DepthVector>(receivers.surface->normals), "receiver normals");
 
+    const auto there = static_cast<std::uint64_t>(std::ranges::count_if(points, [](const DepthVector& p) { return p.z > 0; }));
+    const std::uint64_t all_rays = there * static_cast<std::uint64_t>(prepared.samples);
+    if (shaded.estimated) shaded.estimated(rays.of(static_cast<double>(all_rays) * rays_a_sample(shaded.bound != nullptr)));
     work.stage("shade");
     const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
     const std::size_t bundles = (words + 1) / 2;
@@ -208,7 +217,7 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
             light.first = static_cast<int>(first);
             light.count = static_cast<int>(count);
             work.launch(program, "depth_trace_bundles", {count, bundles}, {64, 1}, count * 24, image.view, light, image.pixels, image.nearest,
-                        on_points, normals, prepared.strata, prepared.step, blocked);
+                        on_points, normals, prepared.strata, prepared.step, blocked, work.stop());
         }
         work.launch(program, "depth_count", {count, 1}, {64, 1}, count * (words * 4 + 16), static_cast<cl_int>(first),
                     static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{0}, on_points, blocked, cl::Buffer(), cl::Buffer(),
@@ -217,17 +226,13 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
     if (shaded.bound) *shaded.bound = bound_of(work, prepared, receivers, points);
     if (!shaded.counts) return;
     follow_some(work, prepared, receivers, points, *shaded.counts);
-    const auto there = std::count_if(points.begin(), points.end(), [](const DepthVector& p) { return p.z > 0; });
-    shaded.counts->receivers = static_cast<std::uint64_t>(there);
-    shaded.counts->pairs = static_cast<std::uint64_t>(there) * static_cast<std::uint64_t>(prepared.samples);
+    shaded.counts->receivers = there;
+    shaded.counts->pairs = all_rays;
 }
 
 std::vector<WorkAmount> work(const DepthTrace& settings, const MaskShape& shape)
 {
-    // Rays for the bound do not end at what blocks them and go one by one, not in bundles: each took 14 to 21 times as long as one for the
-    // mask.
-    const int rays_a_sample = shape.bound ? 16 : 1;
-    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples * rays_a_sample, WorkAmount::Unit::rays, "rays"}};
+    return {rays.of(shape.lights() * shape.pixels() * settings.samples * rays_a_sample(shape.bound))};
 }
 
 std::vector<opencl::Specialisation> specialisations(const DepthTrace&, int lanes) { return {depth_trace_program(lanes)}; }

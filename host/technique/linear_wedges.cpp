@@ -6,6 +6,8 @@
 #include <numbers>
 #include <optional>
 
+#include "scene/stop.hpp"
+
 namespace penumbra {
 namespace {
 
@@ -240,12 +242,14 @@ LinearWedges linear_wedges(const Topology& topology, Silhouette silhouette, cons
         loop_begin.push_back(static_cast<std::uint32_t>(edges.size()));
         std::vector<Wedge> ring, without;
         for (std::uint32_t i = silhouette.loop_begin[loop]; i < silhouette.loop_begin[loop + 1]; ++i) {
+            if (i % 1024 == 0) check_stop();
             Wedge wedge = wedge_of(space, silhouette.edges[i]);
             (wedge.exists ? ring : without).push_back(std::move(wedge));
         }
         result.left_out += without.size();
 
         std::vector<Wedge> wedges;
+        check_stop();
         for (std::size_t i = 0; i < ring.size(); ++i) {
             wedges.push_back(ring[i]);
             const std::vector<Wedge> corner = corner_wedges(ring[i], ring[(i + 1) % ring.size()], most_at_corners);

@@ -8,9 +8,12 @@
 #include "technique/keys.hpp"
 #include "technique/occlusion_levels.hpp"
 #include "technique/occlusion_prefilter.hpp"
+#include "technique/work_estimate.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr WorkKind lookups{"technique.slices", WorkAmount::Unit::pairs, "pairs of slice and receiver"};
 
 constexpr Names<3> placement_names{"uniform", "reciprocal", "occupied"};
 constexpr Names<3> prefilter_names{"nbuffer", "mipmap", "summed_area"};
@@ -182,7 +185,7 @@ void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture&
     nothing.first = 1;
     const auto launch = [&](const OcclusionLight& light, const auto& planes, const auto& levels, const auto& data) {
         work.launch(prepared.program, "occlusion_texture", {width / lanes, height}, {lanes == 1 ? std::size_t{64} : std::size_t{4}, 1},
-                    width * height * 16, view, light, size, planes, levels, data, receivers.xi, receivers.eta, receivers.d, visibility);
+                    width * height * 16, view, light, size, planes, levels, data, receivers.xi, receivers.eta, receivers.d, visibility, work.stop());
     };
     if (prepared.parts.empty()) launch(nothing, cl::Buffer(), cl::Buffer(), cl::Buffer());
     for (const PreparedOcclusionTexture::Part& part : prepared.parts) launch(part.light, part.planes, part.levels, part.data);
@@ -217,6 +220,10 @@ void shade(opencl::Work& work, const PreparedOcclusionTexture& prepared, const R
 {
     const ReceiverPoints points = points_of(work, receivers, prepared.program);
     work.stage("shade");
+    if (shaded.estimated)
+        shaded.estimated(estimate_by_sample(work, points, prepared.program, 1, lookups, [&](const ReceiverPoints& some, const cl::Buffer& to, ShadeCounts& counts) {
+            shade_occlusion_texture(work, prepared, some, to, &counts);
+        }));
     shade_occlusion_texture(work, prepared, points, shaded.visibility, shaded.counts);
 }
 
@@ -226,7 +233,7 @@ std::vector<WorkAmount> work(const OcclusionTexture& settings, const MaskShape& 
     const double textures =
         shape.lights() * settings.light_splits * settings.light_splits * settings.slices * (is_layered(settings) ? settings.layers : 1);
     return {
-        {"technique.slices", textures * shape.pixels(), WorkAmount::Unit::pairs, "pairs of slice and receiver"},
+        lookups.of(textures * shape.pixels()),
         {"technique.resolution", textures * settings.resolution * settings.resolution, WorkAmount::Unit::slice_texels, "texels of slices"}};
 }
 

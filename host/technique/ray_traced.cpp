@@ -1,10 +1,29 @@
 #include "technique/ray_traced.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <penumbra/error.hpp>
 
 #include "technique/keys.hpp"
+#include "technique/work_estimate.hpp"
 
 namespace penumbra {
+namespace {
+
+constexpr WorkKind rays{"technique.samples", WorkAmount::Unit::rays, "rays"};
+
+// Rays for the bound do not end at what blocks them.
+int rays_a_sample(bool bound) { return bound ? 2 : 1; }
+
+// Of a receiver, on average. What adaptive spares is known when it is done: the middle, as a factor, between nothing and all.
+double samples_of_all(const RayTraced& settings)
+{
+    if (!settings.adaptive) return settings.samples;
+    return std::sqrt(static_cast<double>(settings.first_samples) * (settings.first_samples + settings.samples));
+}
+
+} // namespace
 
 TechniqueRow row(const RayTraced&)
 {
@@ -40,6 +59,10 @@ PreparedRays prepare(opencl::Work& work, const Casting& casting, const RayTraced
 void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& receivers, Shaded& shaded)
 {
     work.stage("shade");
+    if (shaded.estimated) {
+        const auto there = std::ranges::count_if(receivers.depth->depth, [](float depth) { return depth > 0 && std::isfinite(depth); });
+        shaded.estimated(rays.of(static_cast<double>(there) * samples_of_all(prepared.settings) * rays_a_sample(shaded.bound != nullptr)));
+    }
     VisibilityResult result = trace_visibility(*prepared.casters, prepared.light, *receivers.depth, receivers.camera,
                                                {.samples = prepared.settings.samples,
                                                 .adaptive = prepared.settings.adaptive,
@@ -57,9 +80,7 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
 
 std::vector<WorkAmount> work(const RayTraced& settings, const MaskShape& shape)
 {
-    // Rays for the bound do not end at what blocks them.
-    const int rays_a_sample = shape.bound ? 2 : 1;
-    return {{"technique.samples", shape.lights() * shape.pixels() * settings.samples * rays_a_sample, WorkAmount::Unit::rays, "rays"}};
+    return {rays.of(shape.lights() * shape.pixels() * settings.samples * rays_a_sample(shape.bound))};
 }
 
 std::vector<opencl::Specialisation> specialisations(const RayTraced&, int) { return {}; }

@@ -17,6 +17,16 @@ bool is_empty(const DepthMap& map)
     return std::none_of(map.depth.begin(), map.depth.end(), [](float depth) { return depth > 0 && std::isfinite(depth); });
 }
 
+// Of one light: known before anything is computed.
+WorkAmount most_work(const ShadowMap& settings, int width, int height)
+{
+    const int side = settings.filter == ShadowFilter::percentage_closer ? settings.taps : settings.filter == ShadowFilter::bicubic ? 4 : 1;
+    return {.key = "receivers.resolution",
+            .amount = static_cast<double>(width) * height * side * side,
+            .unit = WorkAmount::Unit::pairs,
+            .what = "pairs of occluder texel and receiver"};
+}
+
 } // namespace
 
 TechniqueRow row(const ShadowMap&)
@@ -62,7 +72,7 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
     }
     const cl_int taps = prepared.settings.filter == ShadowFilter::hard ? 1 : prepared.settings.taps;
     work.launch(program, "shadow_map_taps", grid, {16, 8}, bytes, view, prepared.view, bias, precision, has_planes, taps, prepared.map.texels,
-                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
+                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, work.stop());
 }
 
 Needs needs(const ShadowMap&) { return {.front = true}; }
@@ -82,14 +92,16 @@ void shade(opencl::Work& work, const PreparedShadowMap& prepared, const Receivin
 {
     const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
+    if (shaded.estimated) shaded.estimated(most_work(prepared.settings, points.view.width, points.view.height));
     shade_shadow_map(work, prepared, points, shaded.visibility);
+    if (shaded.counts) shaded.counts->pairs = static_cast<std::uint64_t>(most_work(prepared.settings, points.view.width, points.view.height).amount);
 }
 
 std::vector<WorkAmount> work(const ShadowMap& settings, const MaskShape& shape)
 {
-    const int side = settings.filter == ShadowFilter::percentage_closer ? settings.taps : settings.filter == ShadowFilter::bicubic ? 4 : 1;
-    return {{"receivers.resolution", shape.lights() * shape.pixels() * side * side, WorkAmount::Unit::pairs,
-             "pairs of occluder texel and receiver"}};
+    WorkAmount most = most_work(settings, shape.receivers.width, shape.receivers.height);
+    most.amount *= shape.lights();
+    return {most};
 }
 
 std::vector<opencl::Specialisation> specialisations(const ShadowMap&, int) { return {program()}; }

@@ -8,6 +8,7 @@
 #include <penumbra/error.hpp>
 
 #include "technique/keys.hpp"
+#include "technique/smoothie_work.hpp"
 
 namespace penumbra {
 namespace {
@@ -237,7 +238,7 @@ PreparedSmoothie prepare_smoothie(opencl::Work& work, const OccluderDepth& depth
             .edges = work.upload(std::span<const float>(edges.edges), "silhouette edges")};
 }
 
-void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility)
+void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility, Shaded* wanted)
 {
     const SmoothieView& view = prepared.view;
     const std::size_t width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height), count = width * height;
@@ -246,15 +247,21 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     const std::size_t inner = view.two_sided ? count : 1;
     const auto distances = work.buffer<float>(inner, "inner distance"), inner_depths = work.buffer<float>(inner, "inner disparity");
     const std::size_t lanes = static_cast<std::size_t>(work.context().quirks().lanes);
-    work.launch(prepared.program, "smoothie_buffer", {(width + lanes - 1) / lanes, (height + 7) / 8},
+    const SmoothieGrid grid_of_texels{.lanes = static_cast<int>(lanes), .columns = static_cast<int>((width + lanes - 1) / lanes), .rows = static_cast<int>((height + SmoothieGrid::item_rows - 1) / SmoothieGrid::item_rows)};
+    const auto evaluated = work.buffer<cl_uint>(grid_of_texels.items(), "evaluated edges");
+    if (wanted && wanted->estimated)
+        wanted->estimated(estimate_smoothie(view, grid_of_texels, {work.read(prepared.boxes), work.read(prepared.edge_boxes)}, work.read(depths_of.nearest), work.read(depths_of.furthest)));
+    work.launch(prepared.program, "smoothie_buffer", {static_cast<std::size_t>(grid_of_texels.columns), static_cast<std::size_t>(grid_of_texels.rows)},
                 {lanes == 1 ? std::size_t{16} : std::size_t{1}, 1}, count * 24 + prepared.edges.bytes(), view, prepared.boxes,
                 prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, fin_distances, depths,
-                distances, inner_depths);
+                distances, inner_depths, evaluated, work.stop());
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(receivers.view.width), static_cast<std::size_t>(receivers.view.height)};
     work.launch(prepared.program, "smoothie_composite", grid, {16, 8}, grid[0] * grid[1] * 16, receivers.view, prepared.occluders, view,
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
                 receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
+    if (!wanted || !wanted->counts) return;
+    for (const cl_uint edges : work.read(evaluated)) wanted->counts->pairs += std::uint64_t{edges} * static_cast<std::uint64_t>(grid_of_texels.item_texels());
 }
 
 // Fins reach beyond what casts, and t is in parts of the view.
@@ -289,15 +296,15 @@ void shade(opencl::Work& work, const PreparedSmoothie& prepared, const Receiving
 {
     const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
-    shade_smoothie(work, prepared, points, shaded.visibility);
+    shade_smoothie(work, prepared, points, shaded.visibility, &shaded);
 }
 
 std::vector<WorkAmount> work(const Smoothie&, const MaskShape& shape)
 {
-    // Each texel of a map is searched for fins; the edges that it meets are known when silhouettes are.
+    // Each texel of a map is searched for fins, at the most of every edge.
     double texels = 0;
     for (const MaskShape::Map& map : shape.occluders) texels += static_cast<double>(map.width) * map.height;
-    return {{"occluders.resolution", texels, WorkAmount::Unit::pairs, "pairs of texel and edge, at one edge a texel"}};
+    return {smoothie_pairs.of(texels * shape.edges)};
 }
 
 std::vector<opencl::Specialisation> specialisations(const Smoothie&, int lanes) { return {program(lanes)}; }

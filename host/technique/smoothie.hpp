@@ -37,8 +37,9 @@ struct PreparedSmoothie {
 // Throws invalid_input for settings that do not go together.
 PreparedSmoothie prepare_smoothie(opencl::Work& work, const OccluderDepth& depth, const SmoothieEdges& edges, const Smoothie& settings);
 
-// Writes visibility, receivers.view.height x receivers.view.width.
-void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility);
+// Writes visibility, receivers.view.height x receivers.view.width. Of `wanted`: says the estimate before the search for edges, and counts it.
+void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility,
+                    Shaded* wanted = nullptr);
 
 // The verbs (verbs.hpp).
 TechniqueRow row(const Smoothie&);

@@ -5,9 +5,12 @@
 #include <penumbra/error.hpp>
 
 #include "technique/keys.hpp"
+#include "technique/work_estimate.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr WorkKind projections{"receivers.resolution", WorkAmount::Unit::pairs, "pairs of occluder texel and receiver"};
 
 constexpr Names<3> sides_names{"front", "back", "both"};
 constexpr Names<2> reduction_names{"area", "nearest"};
@@ -66,7 +69,17 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
     const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
     work.launch(prepared.program, "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
-                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated);
+                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
+}
+
+// Says what shading will take before it begins.
+void shade_estimated(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& points, const cl::Buffer& visibility, Shaded& shaded)
+{
+    if (shaded.estimated)
+        shaded.estimated(estimate_by_sample(work, points, prepared.program, 1, projections, [&](const ReceiverPoints& some, const cl::Buffer& to, ShadeCounts& counts) {
+            shade_soft_shadow_map(work, prepared, some, to, &counts);
+        }));
+    shade_soft_shadow_map(work, prepared, points, visibility, shaded.counts);
 }
 
 // Shades what the light sees of the receivers, and samples that mask from the receivers' camera (3.1).
@@ -77,7 +90,7 @@ void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, 
     const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program);
     const auto light_mask = work.buffer<float>(from_light.depth.size(), "light-space mask");
     work.stage("shade");
-    shade_soft_shadow_map(work, prepared, lit_points, light_mask.memory(), shaded.counts);
+    shade_estimated(work, prepared, lit_points, light_mask.memory(), shaded);
     const ReceiverPoints points = points_of(work, receivers, prepared.program);
     work.stage("project");
     sample_mask(work, points, light_mask.memory(), side, side, shaded.visibility, prepared.program);
@@ -184,7 +197,7 @@ void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Rece
     }
     const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
     work.stage("shade");
-    shade_soft_shadow_map(work, prepared, points, shaded.visibility, shaded.counts);
+    shade_estimated(work, prepared, points, shaded.visibility, shaded);
 }
 
 std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& shape)
@@ -200,7 +213,7 @@ std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& sha
         points = static_cast<double>(settings.project_resolution) * settings.project_resolution;
         amounts.push_back({"technique.project_resolution", points, WorkAmount::Unit::receivers, "pixels"});
     }
-    amounts.push_back({"receivers.resolution", texels * points, WorkAmount::Unit::pairs, "pairs of occluder texel and receiver"});
+    amounts.push_back(projections.of(texels * points));
     return amounts;
 }
 

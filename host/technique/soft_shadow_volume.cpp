@@ -9,9 +9,12 @@
 #include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
 #include "technique/linear_wedges.hpp"
+#include "technique/work_estimate.hpp"
 
 namespace penumbra {
 namespace {
+
+constexpr WorkKind shares{"technique.light_splits", WorkAmount::Unit::pairs, "pairs of edge and receiver"};
 
 constexpr Names<3> coverage_names{"linear", "analytic", "texture"};
 constexpr Names<4> overlap_names{"sum", "max", "half_min", "product"};
@@ -346,7 +349,7 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
                     eye_of(view, light, prepared.settings.culling == WedgeCulling::far_depth), part.sheets, part.sheet_boxes,
                     part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_extents, part.triangles, bounds,
                     receivers.xi, receivers.eta, receivers.d, visibility, evaluated, part.coverage,
-                    static_cast<cl_int>(prepared.settings.table));
+                    static_cast<cl_int>(prepared.settings.table), work.stop());
     }
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
@@ -383,16 +386,18 @@ void shade(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const R
 {
     const ReceiverPoints points = points_of(work, receivers, prepared.program);
     work.stage("shade");
+    if (shaded.estimated)
+        shaded.estimated(estimate_by_sample(work, points, prepared.program, prepared.channels, shares, [&](const ReceiverPoints& some, const cl::Buffer& to, ShadeCounts& counts) {
+            shade_soft_shadow_volume(work, prepared, some, to, &counts);
+        }));
     shade_soft_shadow_volume(work, prepared, points, shaded.visibility, shaded.counts);
 }
 
 std::vector<WorkAmount> work(const SoftShadowVolume& settings, const MaskShape& shape)
 {
-    // How many edges and triangles a receiver meets is known when silhouettes are; this many are taken for granted.
-    constexpr double met = 4096;
+    // Every edge is a silhouette of each part, and meets every receiver.
     const double parts = static_cast<double>(settings.light_splits) * settings.light_splits;
-    return {{"technique.light_splits", parts * shape.lights() * shape.pixels() * met, WorkAmount::Unit::pairs,
-             "pairs of edge and receiver, at 4096 edges a receiver and part"}};
+    return {shares.of(parts * shape.lights() * shape.pixels() * shape.edges)};
 }
 
 std::vector<opencl::Specialisation> specialisations(const SoftShadowVolume& settings, int lanes)

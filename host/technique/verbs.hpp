@@ -6,7 +6,7 @@
 //   Needs needs(const S&)                                                   what prepare wants of the scene
 //   PreparedS prepare(opencl::Work&, const Casting&, const S&, Findings&)   light and casters become state
 //   void shade(opencl::Work&, const PreparedS&, const Receiving&, Shaded&)  state and receivers become visibility
-//   std::vector<WorkAmount> work(const S&, const MaskShape&)                what a mask costs at the most, for limits
+//   std::vector<WorkAmount> work(const S&, const MaskShape&)                what a mask costs at the most, as its sizes tell
 //   std::vector<opencl::Specialisation> specialisations(const S&, int lanes)
 //                                       every program that masks with these settings launch on a device of so many lanes
 //   DeviceBuffers device_buffers(const S&)                                  whether depth and mask may stay on the device
@@ -115,6 +115,9 @@ struct Shaded {
     cl::Buffer visibility; // [height][width][channels] float32
     Image image;
     ShadeCounts* counts = nullptr; // null: do not wait for the device to count
+    // Where it is wanted: told what shading will take, before most of it is done and within a factor of ten (work_estimate.hpp). What it throws
+    // ends the work.
+    std::function<void(const WorkAmount&)> estimated = {};
     // Where it is wanted (a row's `bounds`): the lowest and the highest visibility that each receiver can have, two channels.
     Image* bound = nullptr;
 };
@@ -129,6 +132,7 @@ struct MaskShape {
     };
     Map receivers{};
     std::vector<Map> occluders; // of each light
+    double edges = 0;           // of all that casts, at the most
     bool bound = false;         // whether the bound is wanted, too
     double pixels() const { return static_cast<double>(receivers.width) * receivers.height; }
     double lights() const { return static_cast<double>(occluders.size()); }

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "scene/stop.hpp"
+
 namespace penumbra {
 namespace {
 
@@ -209,6 +211,7 @@ private:
         data_.triangle_extents.resize(extents + 5 * group_size, -1.0F);
         Box box;
         for (std::size_t i = 0; i < triangles.size(); ++i) {
+            if (i % 1024 == 0) check_stop();
             std::array<std::uint32_t, 3> order = triangles[i];
             // Seen from the light they turn counter-clockwise; sorting turns them round with each exchange.
             bool turned = false;

@@ -7,6 +7,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/parallel.hpp"
+#include "scene/stop.hpp"
 #include "trace/crossings.hpp"
 #include "trace/embree_scene.hpp"
 #include "trace/surface.hpp"
@@ -172,7 +173,13 @@ void Tracer::Impl::build()
         rtcAttachGeometry(scene, geometry);
         rtcReleaseGeometry(geometry);
     }
+    // Embree leaves off building where it is told to.
+    const std::shared_ptr<StopWord> stop = current_stop();
+    if (stop)
+        rtcSetSceneProgressMonitorFunction(scene, [](void* word, double) { return static_cast<const StopWord*>(word)->asked == 0; }, stop.get());
     rtcCommitScene(scene);
+    rtcSetSceneProgressMonitorFunction(scene, nullptr, nullptr);
+    check_stop(stop.get());
     check("rtcCommitScene");
 }
 

@@ -17,6 +17,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/parallel.hpp"
+#include "scene/stop.hpp"
 #include "trace/embree_scene.hpp"
 #include "trace/light_samples.hpp"
 #include "trace/surface.hpp"
@@ -180,6 +181,7 @@ private:
                 std::uint8_t seen = nothing;
                 for (int y = row * tile; y < std::min((row + 1) * tile, receivers_.height); ++y)
                     for (int x = column * tile; x < std::min((column + 1) * tile, receivers_.width); ++x) {
+                        check_stop();
                         const Receiver receiver = receiver_at(x, y, scratch);
                         if (!receiver.sees_light) continue;
                         const Tally tally = cast(receiver, strata, pixel_key(x, y, pass));

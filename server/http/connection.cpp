@@ -20,6 +20,7 @@ namespace {
 thread_local Connection* served = nullptr;
 
 constexpr std::size_t read_bytes = 65536; // at a time
+constexpr std::chrono::milliseconds turn{100};
 
 using NameCall = int (*)(int, sockaddr*, socklen_t*);
 
@@ -67,9 +68,10 @@ bool Connection::late()
 {
     // A drip-feeding client has bytes every time one looks: the deadlines count, not the pause.
     const auto slow = lobby_.limits().transfer_end(body_begun_, body_bytes_);
-    if (Deadline::Clock::now() < std::min(slow, request_.end())) return false;
+    const auto ends = std::min(request_.end(), lobby_.end());
+    if (Deadline::Clock::now() < std::min(slow, ends)) return false;
     timed_out_ = true;
-    too_slow_ = slow < request_.end();
+    too_slow_ = slow < ends;
     return true;
 }
 
@@ -81,7 +83,8 @@ std::size_t Connection::receive(char* to, std::size_t size)
         if (got > 0) return static_cast<std::size_t>(got);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
-            wait_for(socket_, POLLIN, std::min(lobby_.limits().transfer_end(body_begun_, body_bytes_), request_.end()));
+            // In short turns: the service may have been told to end.
+            wait_for(socket_, POLLIN, std::min({lobby_.limits().transfer_end(body_begun_, body_bytes_), request_.end(), Deadline::Clock::now() + turn}));
         else
             ended_ = true;
     }

@@ -103,6 +103,14 @@ void Lobby::wait_for_leaving()
     changed_.wait(lock, [this] { return guests_.empty() && served_ == 0; });
 }
 
+void Lobby::end_by(Clock::time_point end)
+{
+    const std::scoped_lock lock(mutex_);
+    end_ = end;
+    next_end_ = std::min(next_end_, end);
+    wake();
+}
+
 std::size_t Lobby::connections() const
 {
     const std::scoped_lock lock(mutex_);
@@ -137,7 +145,9 @@ void Lobby::run()
 
 void Lobby::wake() { eventfd_write(wake_, 1); }
 
-Lobby::Clock::time_point Lobby::end_of(const Guest& guest) const
+Lobby::Clock::time_point Lobby::end_of(const Guest& guest) const { return std::min(end_.load(), end_of_phase(guest)); }
+
+Lobby::Clock::time_point Lobby::end_of_phase(const Guest& guest) const
 {
     switch (guest.phase) {
     case Phase::headers:

@@ -5,6 +5,7 @@
 // never one of the threads that answer requests.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -64,6 +65,10 @@ public:
     // Returns when all have left.
     void wait_for_leaving();
 
+    // No guest stays longer, and no body is waited for.
+    void end_by(Clock::time_point end);
+    Clock::time_point end() const { return end_; }
+
     std::size_t connections() const; // those that are open
     const LobbyLimits& limits() const { return limits_; }
 
@@ -81,6 +86,7 @@ private:
     void run();
     void wake();
     Clock::time_point end_of(const Guest& guest) const;
+    Clock::time_point end_of_phase(const Guest& guest) const;
     void begin_phase(Guests::iterator guest, Phase phase, bool watched);
     void move_on(Guests::iterator guest);
     void read_headers(Guests::iterator guest);
@@ -106,6 +112,7 @@ private:
     std::size_t served_ = 0;                                // handed over and not back
     std::uint64_t waiting_bytes_ = 0;                       // of answers
     bool ending_ = false;
+    std::atomic<Clock::time_point> end_ = Clock::time_point::max(); // of all guests
     std::thread thread_;
 };
 

@@ -15,7 +15,9 @@
 namespace penumbra::server {
 namespace {
 
-constexpr std::chrono::milliseconds last_work{900}; // of requests in flight when the service ends
+// After the end was asked for: what is under way may end by itself, and answers may leave. Together below a second.
+constexpr std::chrono::milliseconds grace{500}, goodbye{250};
+
 constexpr int backlog = 1024; // connections that the kernel keeps for us; the HTTP library asks for 5
 
 bool is_request_id(std::string_view id)
@@ -92,11 +94,16 @@ Service::Http::Http(Service& service) : service_(service)
     });
 }
 
+void Service::Http::end_by(Deadline::Clock::time_point end)
+{
+    if (Lobby* const lobby = lobby_) lobby->end_by(end);
+}
+
 void Service::Http::lengthen_backlog() { ::listen(svr_sock_, backlog); }
 
 bool Service::Http::process_and_close_socket(socket_t socket)
 {
-    lobby_->arrive(socket);
+    lobby_.load()->arrive(socket);
     return true;
 }
 
@@ -176,11 +183,14 @@ void Service::serve()
 
 void Service::drain() { draining_ = true; }
 
+void Service::end_work() { pool_.end_within(grace); }
+
 void Service::stop()
 {
     draining_ = true;
     stopped_ = true;
-    pool_.end_within(last_work);
+    end_work();
+    http_->end_by(Deadline::Clock::now() + grace + goodbye);
     http_->stop();
 }
 

@@ -39,11 +39,13 @@ public:
     int bind();
     // Has each worker check the device and launch every technique; then /readyz says ready. Throws Problem.
     void become_ready();
-    // Answers until stop(); returns when what was in flight is done.
+    // Answers until stop(); returns when what was in flight is done or stopped.
     void serve();
     // From now on /readyz says 503.
     void drain();
-    // Takes no more connections. May be called from any thread, before serve() too.
+    // What is computed, and getting ready, ends by itself soon or is stopped.
+    void end_work();
+    // Takes no more connections, and ends the work; serve() returns within a second. May be called from any thread, before serve() too.
     void stop();
 
     Gate& gate() { return gate_; }

@@ -1,6 +1,7 @@
 // The HTTP library, with connections of our own (connection.hpp). Only the service's own files see it.
 #pragma once
 
+#include <atomic>
 #include <charconv>
 #include <cstdint>
 #include <optional>
@@ -18,6 +19,8 @@ class Service::Http final : public httplib::Server {
 public:
     explicit Http(Service& service);
     void lengthen_backlog();
+    // All connections are closed by then, whatever they wait for.
+    void end_by(Deadline::Clock::time_point end);
 
 private:
     class Reception;
@@ -27,7 +30,7 @@ private:
     void begin(httplib::Request& request, Connection& connection);
 
     Service& service_;
-    Lobby* lobby_ = nullptr; // while it serves
+    std::atomic<Lobby*> lobby_ = nullptr; // while it serves
 };
 
 // A Content-Length; nothing when it is no number.

@@ -70,6 +70,7 @@ SharedBytes Service::read_body(const Request& request) const
         throw Problem(408, "slow_body",
                       "the body came at less than " + std::to_string(options_.transfer_bytes_s) + " bytes a second, " +
                           std::to_string(transfer_grace.count()) + " s after its begin");
+    if (connection.timed_out() && stopped_) throw service_ends();
     if (connection.timed_out())
         throw Problem(408, "slow_body", "the body did not come within " + std::to_string(options_.deadline_s) + " s of the connection");
     if (came != length)

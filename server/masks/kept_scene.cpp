@@ -7,6 +7,7 @@
 #include <penumbra/error.hpp>
 
 #include "masks/digest.hpp"
+#include "masks/moved_maps.hpp"
 #include "masks/resources.hpp"
 #include "process/problem.hpp"
 
@@ -186,6 +187,11 @@ MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, co
     after.check_shared_views();
     if (!changes.same("receivers") || (!same_cameras && after.has("receivers")))
         task.job.receivers = std::make_shared<const Receivers>(after.receivers(first, resources, task.job.warnings));
+
+    if (!same_lights) {
+        MaskJob moved{.lights = lights, .receivers = task.job.receivers, .geometry = scene_.job.geometry, .technique = task.job.technique};
+        for (std::string& warning : warnings_of_moved_maps(scene_.job, moved)) task.job.warnings.push_back(std::move(warning));
+    }
 
     choose(changes, lights, changes.same("occluders") && (same_cameras || !after.has("occluders")), choice, task);
     if (!changes.same("receivers") && after.names_file("receivers", changes.names)) task.receivers_key.clear();

@@ -53,17 +53,20 @@ private:
 };
 
 // Calls it with the hooks of a run of the task: its cache, and the deadline between steps.
-template <class Call> void with_hooks(const MaskTask& task, const Deadline& deadline, const Call& call)
+template <class Call>
+void with_hooks(const MaskTask& task, const Deadline& deadline, std::function<void(const WorkAmount&)> estimated, const Call& call)
 {
     TaskKeeper keeper(task);
-    call(MaskHooks{.keeper = task.cache ? &keeper : nullptr, .before = [&](std::string_view next) { deadline.check(next); }});
+    call(MaskHooks{.keeper = task.cache ? &keeper : nullptr,
+                   .before = [&](std::string_view next) { deadline.check(next); },
+                   .estimated = std::move(estimated)});
 }
 
 // The mask of all the task's lights together, which a run gives last.
-Mask mask_of(const Engine& engine, const MaskTask& task, const Deadline& deadline)
+Mask mask_of(const Engine& engine, const MaskTask& task, const Options& options, const Deadline& deadline)
 {
     Mask last;
-    with_hooks(task, deadline,
+    with_hooks(task, deadline, estimate_check(task, options, deadline),
                [&](const MaskHooks& hooks) { engine.masks(task.job, hooks, [&](NamedMask&& named) { last = std::move(named.mask); }); });
     return last;
 }
@@ -123,7 +126,7 @@ MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Op
 
 void prepare_all(const Engine& engine, const MaskTask& task, const Deadline& deadline)
 {
-    with_hooks(task, deadline, [&](const MaskHooks& hooks) { engine.prepare(task.job, hooks); });
+    with_hooks(task, deadline, {}, [&](const MaskHooks& hooks) { engine.prepare(task.job, hooks); });
 }
 
 MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFormat& format, const Options& options,
@@ -132,7 +135,7 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
     check_work(task, options);
     MaskReply reply;
     const auto computing = Deadline::Clock::now();
-    const Mask mask = mask_of(engine, task, deadline);
+    const Mask mask = mask_of(engine, task, options, deadline);
     reply.compute_ms = seconds_since(computing) * 1000;
 
     deadline.check("encoding the mask");

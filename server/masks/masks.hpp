@@ -65,7 +65,7 @@ MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Op
 // Prepares all the task's lights, for its cache. Throws Error and Problem.
 void prepare_all(const Engine& engine, const MaskTask& task, const Deadline& deadline);
 
-// The mask, or its bound where the task's job has that. The deadline is checked between stages. `format`: what negotiate gave; bits of a
+// The mask, or its bound where the task's job has that. Stopped at the deadline. `format`: what negotiate gave; bits of a
 // mask are those of the scene's output when that names the same format. Throws Error and Problem.
 MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFormat& format, const Options& options,
                        const Deadline& deadline);

@@ -1,6 +1,8 @@
 #include "masks/work_limits.hpp"
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <string>
 #include <string_view>
@@ -26,6 +28,23 @@ void check_amount(std::string_view where, double amount, std::string_view what, 
     std::snprintf(text.data(), text.size(), "%.3g", amount);
     throw Error::at(ErrorCode::too_large, std::string(where), std::string("asks for ") + text.data() + " " + std::string(what),
                     "the limit of the service is " + std::to_string(limit));
+}
+
+// So few are some seconds of one core at the most, and not worth a sample.
+constexpr std::int64_t few_pairs = std::int64_t{1} << 33;
+
+// A sample tells the time within a factor of some two: what is over the time left by this much does not end within it.
+constexpr double surely = 4;
+
+void check_time(const WorkAmount& work, const Deadline& deadline)
+{
+    const double left = std::chrono::duration<double>(deadline.end() - Deadline::Clock::now()).count();
+    if (work.seconds <= surely * std::max(left, 0.0)) return;
+    std::array<char, 96> text{};
+    std::snprintf(text.data(), text.size(), "would take about %.0f s, as a sample of the mask did", work.seconds);
+    std::array<char, 96> hint{};
+    std::snprintf(hint.data(), hint.size(), "expected at most the %.0f s that are left of the request's time", std::max(left, 0.0));
+    throw Error::at(ErrorCode::too_large, std::string(work.key), text.data(), hint.data());
 }
 
 // The option that bounds work counted in that unit.
@@ -61,7 +80,22 @@ void check_work(const MaskTask& task, const Options& options)
         check_amount("lights", points, "receivers, over all lights", options.receivers);
         check_amount("lights", texels, "texels of occluder maps, over all lights", options.image_samples);
     }
-    for (const WorkAmount& work : work_of(task.job)) check_amount(work.key, work.amount, work.what, limit_of(work.unit, options));
+    // Of pairs the sizes tell far too many (estimate_check).
+    for (const WorkAmount& work : work_of(task.job))
+        if (work.unit != WorkAmount::Unit::pairs) check_amount(work.key, work.amount, work.what, limit_of(work.unit, options));
+}
+
+std::function<void(const WorkAmount&)> estimate_check(const MaskTask& task, const Options& options, const Deadline& deadline)
+{
+    const double least = static_cast<double>(std::min(options.pairs, few_pairs));
+    const std::vector<WorkAmount> most = work_of(task.job);
+    if (std::ranges::none_of(most, [&](const WorkAmount& work) { return work.unit == WorkAmount::Unit::pairs && work.amount > least; })) return {};
+    return [&options, &deadline, pairs = 0.0](const WorkAmount& work) mutable {
+        if (work.unit != WorkAmount::Unit::pairs) return;
+        pairs += work.amount;
+        check_amount(work.key, pairs, work.what, options.pairs);
+        check_time(work, deadline);
+    };
 }
 
 } // namespace penumbra::server

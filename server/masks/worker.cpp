@@ -12,6 +12,7 @@
 #include <penumbra/engine.hpp>
 #include <penumbra/error.hpp>
 #include <penumbra/image.hpp>
+#include <penumbra/stop.hpp>
 
 #include "masks/call.hpp"
 #include "masks/depth_view.hpp"
@@ -23,6 +24,7 @@
 #include "process/memory.hpp"
 #include "process/ready.hpp"
 #include "process/shared_bytes.hpp"
+#include "process/watch.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -50,11 +52,24 @@ public:
     // `bytes`: what goes beside the answer.
     CallReply answer(const Call& call, std::vector<Descriptor> files, Descriptor& bytes)
     {
-        const Deadline deadline(std::chrono::duration_cast<Deadline::Clock::duration>(std::chrono::duration<double>(call.seconds)));
+        const auto left = std::chrono::duration_cast<Deadline::Clock::duration>(std::chrono::duration<double>(call.seconds));
+        const std::chrono::seconds limit(options_.deadline_s);
+        const Deadline deadline(limit, Deadline::Clock::now() + left - limit);
+        const auto watched = watch_.until(deadline);
         limit_processor(static_cast<std::uint64_t>(call.seconds + 2) * std::max(std::thread::hardware_concurrency(), 1U));
         std::vector<SharedBytes> shared;
         for (Descriptor& file : files) shared.emplace_back(std::move(file));
         shared.resize(2);
+        try {
+            return done(call, shared, deadline, bytes);
+        } catch (const Stopped&) {
+            throw deadline.over();
+        }
+    }
+
+private:
+    CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    {
         switch (call.kind) {
         case Call::Kind::warm:
             check_known_mask(engine_);
@@ -72,7 +87,6 @@ public:
         throw Error(ErrorCode::internal, "a call of no kind");
     }
 
-private:
     std::vector<Part> parts_of(std::string_view body, const std::string& form) const
     {
         return parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
@@ -155,6 +169,7 @@ private:
 
     const Options& options_;
     const Engine& engine_;
+    Watch watch_;
     SceneStore scenes_;
 };
 

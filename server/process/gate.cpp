@@ -2,8 +2,6 @@
 
 #include <string>
 
-#include "process/problem.hpp"
-
 namespace penumbra::server {
 
 void Deadline::check(std::string_view next) const
@@ -11,6 +9,12 @@ void Deadline::check(std::string_view next) const
     if (!passed()) return;
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit_).count();
     throw Problem(504, "deadline", "the request's " + std::to_string(seconds) + " s were over before it came to: " + std::string(next), 1);
+}
+
+Problem Deadline::over() const
+{
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit_).count();
+    return Problem(504, "deadline", "the request's " + std::to_string(seconds) + " s were over while it was computed; expected less work: fewer samples, smaller maps, a smaller mask");
 }
 
 bool Gate::full() const

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "process/problem.hpp"
+
 namespace penumbra::server {
 
 // When a request's time is up.
@@ -21,6 +23,8 @@ public:
     bool passed() const { return Clock::now() >= end_; }
     // Throws Problem 504 when it has passed; `next` is what would have come now.
     void check(std::string_view next) const;
+    // The Problem 504 of what was stopped on its way.
+    Problem over() const;
 
 private:
     Clock::duration limit_;

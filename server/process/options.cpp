@@ -49,8 +49,8 @@ const std::array rows{
     OptionRow{"receivers", "pixels", "largest mask, width x height", {1, giga}, &Options::receivers},
     OptionRow{"pairs",
               "pairs",
-              "most pairs of occluder texel and receiver that soft_shadow_map may have to look at; soft_shadow_volume counts as 4096 a "
-              "receiver and part of the light",
+              "most pairs that a mask may take, of occluder texel, silhouette edge or slice and receiver (smoothie: of edge and texel), as a "
+              "sample tells when the light is prepared",
               {1, std::int64_t{1} << 60},
               &Options::pairs},
     OptionRow{
@@ -62,7 +62,7 @@ const std::array rows{
         &Options::rays},
     OptionRow{"deadline-s",
               "seconds",
-              "longest time from connection to result; checked while the body comes, in the queue and between stages",
+              "longest time from connection to result; work that is under way then is stopped",
               {1, 3600},
               &Options::deadline_s},
     OptionRow{"header-s", "seconds", "longest time for a request's headers", {1, 60}, &Options::header_s},
@@ -93,7 +93,7 @@ const std::array rows{
               "most memory of answers that wait for their clients; beyond, the one that waits longest is given up",
               {mega, 64 * giga},
               &Options::answer_bytes},
-    OptionRow{"drain-s", "seconds", "after SIGTERM, how long requests are still taken while /readyz says 503", {0, 600}, &Options::drain_s},
+    OptionRow{"drain-s", "seconds", "after SIGTERM, how long requests are still taken while /readyz says 503; then what is under way has half a second, and is stopped", {0, 600}, &Options::drain_s},
     OptionRow{"scenes", "scenes", "most scenes that are kept; the longest unused goes first", {0, 65536}, &Options::scenes},
     OptionRow{"scenes-bytes",
               "bytes",
@@ -225,7 +225,7 @@ std::string help_text()
         out << environment_of(row) << "\n";
     }
     out << "\n  --help, --version, --limits (the table of docs/limits.md)\n\n"
-           "SIGTERM and SIGINT end it when the work in flight is done.\n"
+           "SIGTERM and SIGINT end it: work in flight has half a second after --drain-s, and is then stopped.\n"
            "Exit codes: 0 ended as asked, 1 it could not work, 2 wrong usage.\n";
     return out.str();
 }

@@ -28,7 +28,7 @@ struct Options {
     std::int64_t image_samples = std::int64_t{1} << 24;
     std::int64_t receivers = std::int64_t{1} << 22;
     std::int64_t pairs = std::int64_t{1} << 40;
-    std::int64_t rays = std::int64_t{1} << 26;
+    std::int64_t rays = std::int64_t{1} << 34;
     std::int64_t deadline_s = 30;
     std::int64_t header_s = 5;
     std::int64_t header_bytes = 16384;

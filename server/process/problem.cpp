@@ -31,6 +31,8 @@ Problem defect() { return problem_from(Error(ErrorCode::internal, {})); }
 
 Problem out_of_memory() { return Problem(503, "memory", "this takes more memory than there is now; send less, or try again", 5); }
 
+Problem service_ends() { return Problem(503, "ending", "the service is about to end, and this takes longer than it waits; try again", 5); }
+
 std::string_view title_of(int status)
 {
     switch (status) {

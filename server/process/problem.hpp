@@ -30,6 +30,9 @@ Problem defect();
 // std::bad_alloc: 503.
 Problem out_of_memory();
 
+// What was under way when the service was told to end.
+Problem service_ends();
+
 std::string_view title_of(int status);
 std::string json_of(const Problem& problem, std::string_view request_id);
 

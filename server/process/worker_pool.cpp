@@ -28,8 +28,6 @@ namespace {
 constexpr std::chrono::milliseconds first_pause{100}, longest_pause{10000};
 constexpr std::chrono::minutes longest_start{10}; // kernels may have to be built
 
-Problem ending() { return Problem(503, "draining", "the service is about to end", 5); }
-
 std::string death_of(int status)
 {
     if (WIFSIGNALED(status)) return std::string("signal ") + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) + ")";
@@ -233,10 +231,10 @@ WorkerPool::Lease WorkerPool::lease(std::string_view name, const Deadline& deadl
         best = nullptr;
         for (const auto& worker : workers_)
             if (worker->state == State::idle && (!best || better(*worker, *best))) best = worker.get();
-        return best || ending_;
+        return best || over();
     };
-    if (!changed_.wait_until(lock, deadline.end(), found) || !best) {
-        if (ending_) throw ending();
+    if (!changed_.wait_until(lock, deadline.end(), found) || over()) {
+        if (over()) throw service_ends();
         throw Problem(503, "no_worker", "no worker was free in time; they are being started again", 1);
     }
     best->state = State::busy;
@@ -247,8 +245,10 @@ WorkerPool::Lease WorkerPool::lease_number(std::size_t number, const Deadline& d
 {
     std::unique_lock lock(mutex_);
     Worker& worker = *workers_.at(number);
-    if (!changed_.wait_until(lock, deadline.end(), [&] { return worker.state == State::idle || ending_; }) || ending_)
+    if (!changed_.wait_until(lock, deadline.end(), [&] { return worker.state == State::idle || over(); }) || over()) {
+        if (over()) throw service_ends();
         throw Problem(503, "no_worker", "worker " + std::to_string(number) + " did not start in time", 5);
+    }
     worker.state = State::busy;
     return {*this, worker};
 }
@@ -296,8 +296,8 @@ Message WorkerPool::Lease::call(std::string_view text, std::span<const int> file
     const bool late = got == Channel::Got::late, ended = Clock::now() >= pool_->end_;
     pool_->bury(worker, late);
     pool_->changed_.notify_all();
-    if (ended) throw ending();
-    if (late) throw Problem(504, "deadline", "the request's time was over while it was computed", 1);
+    if (ended) throw service_ends();
+    if (late) throw deadline.over();
     throw Problem(500, "crashed", "the process that computed this ended; others in flight did not notice. The log has the request's digest");
 }
 
@@ -323,7 +323,10 @@ void WorkerPool::end_within(std::chrono::milliseconds time)
 {
     const std::scoped_lock lock(mutex_);
     end_ = std::min(end_, Clock::now() + time);
+    changed_.notify_all();
 }
+
+bool WorkerPool::over() const { return ending_ || Clock::now() >= end_; }
 
 WorkerPool::Counts WorkerPool::counts() const
 {

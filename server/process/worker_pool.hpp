@@ -86,6 +86,7 @@ public:
 
 private:
     enum class State { dead, starting, idle, busy };
+    bool over() const; // with the mutex: nobody computes any more
     void supervise();
     void spawn(Worker& worker);
     void bury(Worker& worker, bool overdue);

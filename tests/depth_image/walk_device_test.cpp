@@ -53,7 +53,7 @@ Bits on_device(const DepthImage& image, const std::vector<DepthVector>& points, 
                left = work.upload(std::span<const cl_uint>(none).first(points.size()), "left");
     const cl_float2 step{{static_cast<float>(strata.step_x * 0x1p-16), static_cast<float>(strata.step_y * 0x1p-16)}};
     work.launch(depth_trace_program(work.context().quirks().lanes), "depth_trace", {points.size(), 1}, {64, 1}, 0, image.view, light_of(static_cast<int>(points.size())),
-                cl_int{1}, pixels, nearest, on_points, cl::Buffer(), on_strata, step, blocked, crossed, unknown, left);
+                cl_int{1}, pixels, nearest, on_points, cl::Buffer(), on_strata, step, blocked, crossed, unknown, left, cl::Buffer());
     Bits bits{work.read(blocked), work.read(crossed), work.read(unknown)};
     work.finish();
     return bits;

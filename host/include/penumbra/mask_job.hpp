@@ -60,22 +60,28 @@ public:
     virtual void keep(std::shared_ptr<const Receivers> receivers) = 0;
 };
 
+// Some of the work that a mask takes.
+struct WorkAmount {
+    enum class Unit { pairs, rays, slice_texels, receivers };
+    std::string_view key; // of the scene file, that asks for it
+    double amount = 0;
+    Unit unit = Unit::pairs;
+    std::string_view what; // are counted
+    double seconds = 0;    // that it takes, where a sample was timed; 0: nobody knows
+};
+
 // Who takes part in a run. Both may be left out.
 struct MaskHooks {
     MaskKeeper* keeper = nullptr;
     // Called before each step that may take long, with what comes next ("preparing", "the receivers' depth", "shading"). What it throws
     // ends the run.
     std::function<void(std::string_view next)> before = {};
+    // Called for each light's mask with what shading it will take, which a sample has told. What it throws ends the run.
+    std::function<void(const WorkAmount&)> estimated = {};
 };
 
-// Some of the work that a job asks for, at the most.
-struct WorkAmount {
-    enum class Unit { pairs, rays, slice_texels, receivers };
-    std::string_view key; // of the scene file, that asks for it
-    double amount;
-    Unit unit;
-    std::string_view what; // are counted
-};
+// What a job asks for at the most, as its sizes tell. Pairs of texel, edge or slice and receiver may be thousands of times fewer: that is known
+// when the light is prepared (MaskHooks::estimated).
 PENUMBRA_API std::vector<WorkAmount> work_of(const MaskJob& job);
 
 } // namespace penumbra

@@ -19,4 +19,5 @@
 #include <penumbra/mask_job.hpp>
 #include <penumbra/metrics.hpp>
 #include <penumbra/scene.hpp>
+#include <penumbra/stop.hpp>
 #include <penumbra/technique.hpp>

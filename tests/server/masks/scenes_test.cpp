@@ -120,6 +120,33 @@ TEST(Scenes, FollowALightOverObjects)
     EXPECT_EQ(mask_of(port, id, "{" + rays + "}").status, 200);
 }
 
+// Maps that were sent are the light's view, and move with it.
+TEST(Scenes, SayThatSentMapsMoveWithTheirLight)
+{
+    const int port = shared_port();
+    const std::string id = id_in(keep(port));
+    const Reply before = mask_of(port, id, "{}"), moved = mask_of(port, id, R"({"light": {"center": [1, 0, 0.5]}})");
+    ASSERT_EQ(moved.status, 200) << moved.body;
+    EXPECT_EQ(moved.body, before.body);
+    EXPECT_TRUE(holds(moved.header("Penumbra-Warnings"), "occluders.depth and receivers.depth were sent as the light's own view and moved with the light")) << moved.head;
+    EXPECT_TRUE(holds(moved.header("Penumbra-Warnings"), "send objects")) << moved.head;
+    EXPECT_EQ(before.header("Penumbra-Warnings").find("moved with"), std::string::npos) << before.head;
+    // Another size leaves it where it is; turned it looks elsewhere.
+    EXPECT_EQ(mask_of(port, id, R"({"light": {"half_u": [0.125, 0, 0]}})").header("Penumbra-Warnings").find("moved with"), std::string::npos);
+    EXPECT_TRUE(holds(mask_of(port, id, R"({"light": {"half_v": [0, 0, 0.25]}})").header("Penumbra-Warnings"), "moved with the light"));
+
+    // Over objects the light moves alone.
+    const std::string objects = id_in(keep(port, {{"scene", objects_scene().dump()}}));
+    EXPECT_EQ(mask_of(port, objects, R"({"light": {"center": [1, 6, 0.5]}})").header("Penumbra-Warnings").find("moved with"), std::string::npos);
+
+    // With receivers of a camera of their own the casters alone move.
+    Json seen = scene_json();
+    seen["receivers"]["camera"] = {{"kind", "pinhole"}, {"eye", {0, 2, 0}}, {"target", {0, -2, 0}}, {"up", {0, 0, -1}}, {"vertical_fov_deg", 50}};
+    const Reply half = mask_of(port, id_in(keep(port, parts(seen))), R"({"light": {"center": [0.25, 0, 0]}})");
+    ASSERT_EQ(half.status, 200) << half.body;
+    EXPECT_TRUE(holds(half.header("Penumbra-Warnings"), "occluders.depth was sent as the light's own view")) << half.head;
+}
+
 TEST(Scenes, TakeFurtherImagesWithAPatch)
 {
     const int port = shared_port();
