@@ -17,6 +17,7 @@ constexpr Names<3> prefilter_names{"nbuffer", "mipmap", "summed_area"};
 constexpr Names<4> level_names{"nbuffer", "mipmap", "table", "smooth"}; // of LevelKind
 constexpr Names<2> storage_names{"binary32", "normalized16"};
 constexpr Names<5> combine_names{"product", "sum", "max", "layered", "layered_max"};
+constexpr Names<2> projection_centre_names{"light", "behind_light"};
 constexpr Names<3> self_shadow_names{"fade", "own", "omit"};
 
 static_assert(static_cast<int>(Combine::product) == COMBINE_PRODUCT && static_cast<int>(Combine::sum) == COMBINE_SUM);
@@ -99,6 +100,8 @@ TechniqueRow row(const OcclusionTexture&)
                      choice_key<S>("placement", &S::placement, placement_names,
                                    "slices of even depth, of even 1 / depth, or with as much of the casters' area in each"),
                      integer_key<S>("resolution", &S::resolution, {4, 4096}, "texels", "along each side of a slice"),
+                     choice_key<S>("projection_centre", &S::projection_centre, projection_centre_names,
+                                   "where slices are seen from: the light's centre, or behind it (3.4), so that its edges' frustum holds the casters"),
                      choice_key<S>("prefilter", &S::prefilter, prefilter_names,
                                    "how a slice's mean over any square is had; summed_area is exact and takes rectangles"),
                      choice_key<S>("storage", &S::storage, storage_names, "of N-buffers and mip-maps"),
@@ -122,7 +125,7 @@ TechniqueRow row(const OcclusionTexture&)
 }
 
 PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
-                                                   const SolidMaps* solid, const OcclusionTexture& settings)
+                                                   const SolidMaps* solid, const OcclusionTexture& settings, bool receivers_cast)
 {
     work.stage("casters");
     LightFrame frame = light_frame(light);
@@ -143,7 +146,7 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
             prepared.view = light_camera(frame, {1, 1}, frame.origin);
         }
     }
-    const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings);
+    const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings, receivers_cast);
     if (scenery.depths.empty()) {
         prepared.warnings.push_back("nothing that casts lies before the light: nothing casts shadows");
         return prepared;
@@ -206,7 +209,7 @@ PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, con
     std::optional<SolidMaps> solid;
     if (casting.meshes.empty() && maps.back) solid.emplace(*maps.front, *maps.back, maps.camera);
 
-    PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings);
+    PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings, casting.receivers_cast);
     findings.view = prepared.view;
     findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     findings.notes = prepared.notes;

@@ -106,7 +106,7 @@ inline oracle::slices::Scene oracle_scene(const std::shared_ptr<opencl::Context>
                         .centre_y = (2 * j + 1 - splits) * frame.half_v / splits,
                         .half_u = frame.half_u / splits,
                         .half_v = frame.half_v / splits};
-    oracle::slices::Scene scene{.view = slice_view(casters, range, own, settings.resolution, settings.slices, frame.directional),
+    oracle::slices::Scene scene{.view = slice_view(casters, range, own, settings, frame.directional),
                                 .depths = slice_depths(casters, range, settings.slices, settings.placement, frame.directional),
                                 .bits = {},
                                 .settings = settings,

@@ -7,6 +7,7 @@ enum class Placement { uniform, reciprocal, occupied };
 enum class Prefilter { nbuffer, mipmap, summed_area };
 enum class Combine { product, sum, max, layered, layered_max };
 enum class SelfShadow { fade, own, omit };
+enum class ProjectionCentre { light, behind_light };
 enum class LevelStorage { binary32, normalized16 };
 
 // Occlusion textures (Eisemann, Decoret, Occlusion Textures for Plausible Soft Shadows, 2008): the casters cut into slices parallel to the
@@ -17,6 +18,8 @@ struct OcclusionTexture {
     Placement placement =
         Placement::uniform; // of the slices along the light's axis: even in depth (3.4), in its reciprocal, or in the casters' area
     int resolution = 256;   // texels along each side of a slice
+    ProjectionCentre projection_centre =
+        ProjectionCentre::light; // the slices are seen from the light's centre, or from so far behind it that its edges' frustum holds the casters (3.4)
     Prefilter prefilter = Prefilter::nbuffer;          // 3.2
     LevelStorage storage = LevelStorage::normalized16; // of N-buffers and mip-maps
     Combine combine =
@@ -24,7 +27,7 @@ struct OcclusionTexture {
     int layers = 4;        // layered: depth layers, the last of which takes all that lies behind
     bool leak_fix = false; // each slice is seen in the next one away from the light too (3.4.1)
     SelfShadow self_shadow =
-        SelfShadow::fade; // 3.4.2: fade: a receiver's own slice is left out and the one before fades in with the distance from it
+        SelfShadow::fade; // fade: a receiver's own slice is left out and the one before fades in with the distance from it (3.4.2)
     int light_splits = 1; // n x n parts of a rectangle, each with slices of its own
 };
 
