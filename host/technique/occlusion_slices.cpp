@@ -18,20 +18,19 @@ struct Fade {
 // A receiver on a plane itself does not count as beyond it, whatever rounding made of its depth.
 double beyond(double far) { return far + 0x1p-20 * std::abs(far); }
 
-Fade fade_of(const std::vector<float>& depths, std::size_t slice, const OcclusionTexture& settings, bool receivers_cast)
+Fade fade_of(const std::vector<float>& depths, std::size_t slice, SelfShadow self_shadow)
 {
     const double near = depths[slice], far = depths[slice + 1];
-    if (settings.self_shadow == SelfShadow::own) return {near, far};
-    // What lies beyond the last caster is none of them, and what does not cast does not shade itself: there a slice counts in full.
+    if (self_shadow == SelfShadow::own) return {near, far};
+    // What lies beyond the last caster is none of them: there a slice counts in full.
     const bool last = slice + 2 == depths.size();
-    if (last && !receivers_cast) return {far - 0x1p-20 * std::abs(far), far - 0x1p-20 * std::abs(far)};
-    if (last || settings.self_shadow == SelfShadow::omit) return {beyond(far), beyond(far)};
+    if (last || self_shadow == SelfShadow::omit) return {beyond(far), beyond(far)};
     return {beyond(far), static_cast<double>(depths[slice + 2])};
 }
 
 // The slices' planes as shading needs them, all layers of each.
 std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<float>& depths, const SlicePart& part,
-                                      const OcclusionTexture& settings, bool receivers_cast)
+                                      const OcclusionTexture& settings, SelfShadow self_shadow)
 {
     const bool layered = is_layered(settings);
     std::vector<OcclusionPlane> planes;
@@ -39,7 +38,7 @@ std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<f
         const double far = depths[k + 1];
         const double per = view.orthographic ? 1 : 1 / (far + static_cast<double>(view.behind));
         const double along = view.orthographic ? 1 : far * per;
-        const Fade fade = fade_of(depths, k, settings, receivers_cast);
+        const Fade fade = fade_of(depths, k, self_shadow);
         OcclusionPlane plane{.slice = static_cast<int>(k),
                              .layer = -1,
                              .levels = 1,
@@ -68,6 +67,13 @@ std::array<int, 2> taps_of(const std::vector<OcclusionPlane>& planes)
     }
     const auto taps = [](double ratio) { return static_cast<int>(std::clamp(std::ceil(ratio * (1 - 0x1p-20)), 1.0, most_taps)); };
     return {taps(x / y), taps(y / x)};
+}
+
+// A receiver that does not cast has no slice of its own.
+SelfShadow self_shadow_of(const OcclusionTexture& settings, bool receivers_cast)
+{
+    if (settings.self_shadow != SelfShadow::automatic) return settings.self_shadow;
+    return receivers_cast ? SelfShadow::fade : SelfShadow::own;
 }
 
 void mark_triangles(opencl::Work& work, const opencl::Specialisation& program, const SliceScenery& scenery, const SliceView& view,
@@ -111,7 +117,7 @@ SliceScenery slice_scenery(opencl::Work& work, const LightFrame& frame, std::spa
                          .triangles = {},
                          .large = {},
                          .solid = solid,
-                         .receivers_cast = receivers_cast,
+                         .self_shadow = self_shadow_of(settings, receivers_cast),
                          .front = {},
                          .back = {}};
     scenery.range = slice_range(scenery.casters, frame.directional);
@@ -149,7 +155,7 @@ MarkedSlices marked_slices(opencl::Work& work, const opencl::Specialisation& pro
     mark_triangles(work, program, scenery, marked.view, marked.occupancy);
     mark_solid(work, program, scenery, marked.view, marked.occupancy);
 
-    const std::vector<OcclusionPlane> all = planes_of(marked.view, scenery.depths, part, settings, scenery.receivers_cast);
+    const std::vector<OcclusionPlane> all = planes_of(marked.view, scenery.depths, part, settings, scenery.self_shadow);
     marked.taps = taps_of(all);
     const auto planes = work.upload(std::span<const OcclusionPlane>(all), "planes of slices");
     const auto counts = work.upload(std::span<const cl_int>(std::vector<cl_int>(all.size())), "filled texels");

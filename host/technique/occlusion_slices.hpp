@@ -30,7 +30,7 @@ struct SliceScenery {
     opencl::Buffer<float> vertices, planes;
     opencl::Buffer<cl_int> triangles, large;
     const SolidMaps* solid;
-    bool receivers_cast; // whether a receiver may lie on what casts
+    SelfShadow self_shadow; // not automatic
     opencl::Buffer<float> front, back;
 };
 

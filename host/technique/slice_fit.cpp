@@ -8,7 +8,7 @@ namespace penumbra {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
-static const double widest_tangent = getenv("WT") ? atof(getenv("WT")) : 4;
+constexpr double widest_tangent = 4;
 
 struct Point {
     double x, y, z;

@@ -243,7 +243,7 @@ inline Value weight(const Scene& s, std::size_t k, double z)
         const double at = (z - from) / (to - from);
         return {std::clamp(at, 0.0, 1.0), at < -0x1p-10 || at > 1 + 0x1p-10 ? 0 : 4 * e * (z / (to - from) + 1)};
     };
-    if (s.settings.self_shadow == SelfShadow::own) return ramp(near, far);
+    if (s.settings.self_shadow == SelfShadow::own) return ramp(near, far); // automatic: receivers may cast in these scenes, so fade
     const bool last = k + 2 == s.depths.size();
     return last || s.settings.self_shadow == SelfShadow::omit ? ramp(beyond, beyond) : ramp(beyond, static_cast<double>(s.depths[k + 2]));
 }
