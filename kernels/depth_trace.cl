@@ -6,6 +6,7 @@
 // Specialisation constants
 //   LANES   samples that are tested at once: 16 or 8 on CPU devices, 1 on GPUs
 #include "common/shared.h"
+#include "horizon.cl"
 #include "common/lanes.clh"
 #include "common/depth_walk.h"
 #include "common/depth_samples.clh"

@@ -1,6 +1,8 @@
 // The light clipped at each receiver's own plane: whatever casts, what lies below a surface's horizon does not reach it.
+#ifndef PENUMBRA_HORIZON
+#define PENUMBRA_HORIZON
 #include "common/shared.h"
-#include "common/depth_walk.h"
+#include "common/depth_light.h"
 
 // The share of the square [-1, 1]^2 where h + a x + b y > 0; a and b not negative.
 inline float square_above(const float h, const float a, const float b)
@@ -64,3 +66,5 @@ __kernel void clip_at_horizon(const DepthLight light, const DepthSight sight, co
     if (textured && share > 0.0f) return;
     for (int c = 0; c < channels; ++c) visibility[i * channels + c] = fmin(visibility[i * channels + c], share);
 }
+
+#endif

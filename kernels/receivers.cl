@@ -1,5 +1,8 @@
 // Receivers as light-space points (xi, eta, d), whichever camera saw them, and what tiles of them hold.
+#ifndef PENUMBRA_RECEIVERS
+#define PENUMBRA_RECEIVERS
 #include "common/shared.h"
+#include "horizon.cl" // ends every mask: the program that made it is at hand
 
 #if TILE_WIDTH != 16
 #error "tile_bounds holds a row of a tile in a float16"
@@ -183,3 +186,5 @@ __kernel void sample_mask(const ReceiverView view, __global const float* restric
     const float bottom = mix(mask[b.y * mask_size.x + a.x], mask[b.y * mask_size.x + b.x], part.x);
     visibility[y * view.width + x] = seen ? mix(top, bottom, part.y) : 1.0f;
 }
+
+#endif

@@ -30,9 +30,7 @@ DepthLight depth_light(const Light& light, const Camera& image, const Camera& re
     return result;
 }
 
-opencl::Specialisation horizon_program() { return {"horizon.cl", {}}; }
-
-void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, const cl::Buffer& visibility)
+void clip_at_horizon(opencl::Work& work, const opencl::Specialisation& program, const Horizon& horizon, int channels, const cl::Buffer& visibility)
 {
     DepthLight seen = depth_light(horizon.light, horizon.camera, horizon.camera);
     const std::size_t count = static_cast<std::size_t>(horizon.width) * static_cast<std::size_t>(horizon.height);
@@ -46,7 +44,7 @@ void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, c
                            .width = horizon.width,
                            .height = horizon.height,
                            .orthographic = horizon.camera.orthographic};
-    work.launch(horizon_program(), "clip_at_horizon", {count, 1}, {64, 1}, count * 28, seen, sight, static_cast<cl_int>(horizon.points.get() != nullptr),
+    work.launch(program, "clip_at_horizon", {count, 1}, {64, 1}, count * 28, seen, sight, static_cast<cl_int>(horizon.points.get() != nullptr),
                 static_cast<cl_int>(rectangle && rectangle->emission), static_cast<cl_int>(channels), horizon.points, horizon.depth, horizon.normals,
                 visibility);
 }

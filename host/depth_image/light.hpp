@@ -23,9 +23,7 @@ struct Horizon {
     int width, height;
     cl::Buffer points, depth, normals;
 };
-void clip_at_horizon(opencl::Work& work, const Horizon& horizon, int channels, const cl::Buffer& visibility);
-
-// The program of horizon.cl.
-opencl::Specialisation horizon_program();
+// `program`: any that has horizon.cl, as every technique's on the device does.
+void clip_at_horizon(opencl::Work& work, const opencl::Specialisation& program, const Horizon& horizon, int channels, const cl::Buffer& visibility);
 
 } // namespace penumbra

@@ -74,6 +74,14 @@ bool casters_inside(const std::vector<Object>& objects, const Camera& view, cons
     return true;
 }
 
+// Whether a receiver may lie on what casts. Depth that objects were rendered to is theirs; other depth shows whatever there is.
+bool receivers_may_cast(const std::vector<Object>& objects, const Receivers* receivers)
+{
+    const bool any = std::any_of(objects.begin(), objects.end(), [](const Object& object) { return object.receives; });
+    if (!receivers || !any || (receivers->depth && receivers->depth->from_image)) return true;
+    return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return object.casts && object.receives; });
+}
+
 // Throws invalid_input when the technique wants objects that cast, or a map in their place, and the scene has none.
 void check_casters(const Needs& needs, bool casters, const Occluders& given, const std::string& technique)
 {
@@ -288,7 +296,8 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
                     .meshes = by_view ? std::vector<const TriangleMesh*>{} : meshes.meshes(),
                     .topology = [&] { return objects.topology(); },
                     .tracer = [&] { return objects.casters(); },
-                    .images = {}};
+                    .images = {},
+                    .receivers_cast = receivers_may_cast(geometry.objects(), receivers)};
     if (seen && needs.depth_images) {
         const Stopwatch watch;
         casting.images = objects.images(&Object::casts, state->device);

@@ -108,6 +108,17 @@ opencl::Buffer<DepthVector> upload_normals(opencl::Work& work, const Receivers& 
     return work.upload(std::span<const DepthVector>(*normals), "receiver normals");
 }
 
+// The program that a technique shades with; only rays have none.
+opencl::Specialisation program_of(const PreparedTechnique& data)
+{
+    return std::visit(
+        [](const auto& prepared) -> opencl::Specialisation {
+            if constexpr (requires { prepared.program; }) return prepared.program;
+            return receivers_program();
+        },
+        data);
+}
+
 // Clips the light at the receivers' own planes.
 void clip(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, const cl::Buffer& visibility)
 {
@@ -121,7 +132,7 @@ void clip(opencl::Work& work, const Prepared::State& state, const Receiving& rec
         depth = work.upload(std::span<const float>(receivers.depth->depth), "receiver depth");
     horizon.points = points.memory();
     horizon.depth = depth.memory();
-    clip_at_horizon(work, horizon, state.channels, visibility);
+    clip_at_horizon(work, program_of(state.data), horizon, state.channels, visibility);
 }
 
 // What the technique made, on the host.

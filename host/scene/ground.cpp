@@ -13,22 +13,64 @@ namespace {
 // How far a point may lie from a plane and still be in it.
 double tolerance_at(const Vec3& p) { return 1e-5 * (1 + p.length()); }
 
-// Planes of a mesh's triangles, those of most area first. A few are enough: what is not found to be ground is held in the view.
+// What lies furthest each way of all objects: a plane with some of it on either side has not all objects on one.
+class Extremes {
+public:
+    explicit Extremes(const std::vector<Object>& objects)
+    {
+        std::array<double, 2 * ways.size()> furthest;
+        furthest.fill(-std::numeric_limits<double>::infinity());
+        for (const Object& object : objects)
+            for (const Imath::V3f& position : object.mesh.positions) {
+                const Vec3 p(position);
+                for (std::size_t i = 0; i < furthest.size(); ++i) {
+                    const auto& way = ways[i / 2];
+                    const double along = (way[0] * p.x + way[1] * p.y + way[2] * p.z) * (i % 2 ? -1 : 1);
+                    if (along > furthest[i]) {
+                        furthest[i] = along;
+                        points_[i] = p;
+                    }
+                }
+            }
+    }
+
+    bool on_one_side(const Vec3& normal, double offset) const
+    {
+        bool before = false, behind = false;
+        for (const Vec3& p : points_) {
+            const double height = normal.dot(p) - offset, tolerance = tolerance_at(p);
+            before |= height > tolerance;
+            behind |= height < -tolerance;
+            if (before && behind) return false;
+        }
+        return true;
+    }
+
+private:
+    // Along the axes, and along a cube's diagonals.
+    static constexpr std::array<std::array<double, 3>, 7> ways{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}}};
+    std::array<Vec3, 2 * ways.size()> points_{};
+};
+
+// Planes of a mesh's triangles with what is furthest on one side, those of most area first. A few are enough: what is not found to be ground is
+// held in the view.
 constexpr std::size_t most_planes = 8;
-std::vector<Ground> planes_of(const TriangleMesh& mesh)
+std::vector<Ground> planes_of(const TriangleMesh& mesh, const Extremes& extremes)
 {
     struct Plane {
         double area = 0, largest = 0;
         Ground ground{};
     };
     // Triangles of one plane fall into one bin, or into two beside each other.
-    const double size = std::max((bounds(mesh).max - bounds(mesh).min).length(), 1e-30);
+    const Imath::Box3d box = bounds(mesh);
+    const double size = std::max((box.max - box.min).length(), 1e-30);
     std::map<std::array<long, 4>, Plane> bins;
     for (const auto& [a, b, c] : mesh.triangles) {
         const Vec3 at(mesh.positions[a]), cross = (Vec3(mesh.positions[b]) - at).cross(Vec3(mesh.positions[c]) - at);
         const double area = cross.length();
         if (!(area > 0) || !std::isfinite(area)) continue;
         Vec3 normal = cross / area;
+        if (!extremes.on_one_side(normal, normal.dot(at))) continue;
         // Either way round.
         const double main = std::abs(normal.x) > .5 ? normal.x : std::abs(normal.y) > .5 ? normal.y : normal.z;
         if (main < 0) normal = -normal;
@@ -117,12 +159,12 @@ bool lies_in(const Ground& ground, const TriangleMesh& mesh, const std::array<st
 std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object>& objects)
 {
     std::vector<Ground> grounds;
+    const Extremes extremes(objects);
     for (const Object& object : objects)
-        for (const Ground& plane : planes_of(object.mesh)) {
+        for (const Ground& plane : planes_of(object.mesh, extremes)) {
             const double height = light.directional ? -plane.normal.dot(light.direction) : plane.normal.dot(light.origin) - plane.offset;
             Ground ground = height > 0 ? plane : Ground{-plane.normal, -plane.offset};
             if (!whole_light_before(light, ground)) continue;
-            // Most planes end at the first mesh: what costs more comes after.
             if (!std::all_of(objects.begin(), objects.end(), [&](const Object& other) { return all_before(other.mesh, ground); })) continue;
             for (const auto& triangle : object.mesh.triangles)
                 if (lies_in(ground, object.mesh, triangle))

@@ -92,7 +92,7 @@ Followed follow(opencl::Work& work, const PreparedDepthTrace& prepared, const Re
         DepthLight light = light_for(prepared, image.camera, receivers.camera, !normals.empty());
         light.count = static_cast<int>(points.size());
         light.key_first = static_cast<int>(key_first);
-        work.launch(depth_trace_program(work.context().quirks().lanes), "depth_trace", {points.size(), 1}, {64, 1}, points.size() * 24, image.view,
+        work.launch(prepared.program, "depth_trace", {points.size(), 1}, {64, 1}, points.size() * 24, image.view,
                     light, cl_int{1}, image.pixels, image.nearest, followed.points, on_normals, prepared.strata, prepared.step, followed.blocked,
                     followed.crossed, followed.unknown, followed.left, work.stop());
     }
@@ -113,7 +113,7 @@ Image bound_of(opencl::Work& work, const PreparedDepthTrace& prepared, const Rec
         const Followed followed = follow(work, prepared, receivers, some, normals, first);
         const auto room = [&] { return work.buffer<float>(count, "bounds"); };
         const auto visibility = room(), low = room(), high = room();
-        work.launch(depth_trace_program(work.context().quirks().lanes), "depth_count", {count, 1}, {64, 1}, count * (words * 12 + 16), cl_int{0},
+        work.launch(prepared.program, "depth_count", {count, 1}, {64, 1}, count * (words * 12 + 16), cl_int{0},
                     static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{1}, followed.points, followed.blocked,
                     followed.crossed, followed.unknown, visibility, low, high);
         const std::vector<float> lowest = work.read(low), highest = work.read(high);
@@ -184,6 +184,7 @@ PreparedDepthTrace prepare(opencl::Work& work, const Casting& casting, const Dep
     std::vector<cl_float2> corners;
     for (int i = 0; i < samples; ++i) corners.push_back({{strata.low_x[static_cast<std::size_t>(i)], strata.low_y[static_cast<std::size_t>(i)]}});
     return {.settings = settings,
+            .program = depth_trace_program(work.context().quirks().lanes),
             .light = casting.light,
             .images = std::make_shared<const std::vector<DeviceDepthImage>>(std::move(images)),
             .strata = work.upload(std::span<const cl_float2>(corners), "strata"),
@@ -206,7 +207,6 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
     work.stage("shade");
     const std::size_t words = (static_cast<std::size_t>(prepared.samples) + 31) / 32;
     const std::size_t bundles = (words + 1) / 2;
-    const opencl::Specialisation program = depth_trace_program(work.context().quirks().lanes);
     const std::size_t band = std::min(points.size(), std::max<std::size_t>(most_words / words, 1));
     const std::vector<cl_uint> none(words * band, 0);
     for (std::size_t first = 0; first < points.size(); first += band) {
@@ -216,10 +216,10 @@ void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receivi
             DepthLight light = light_for(prepared, image.camera, receivers.camera, receivers.surface != nullptr);
             light.first = static_cast<int>(first);
             light.count = static_cast<int>(count);
-            work.launch(program, "depth_trace_bundles", {count, bundles}, {64, 1}, count * 24, image.view, light, image.pixels, image.nearest,
+            work.launch(prepared.program, "depth_trace_bundles", {count, bundles}, {64, 1}, count * 24, image.view, light, image.pixels, image.nearest,
                         on_points, normals, prepared.strata, prepared.step, blocked, work.stop());
         }
-        work.launch(program, "depth_count", {count, 1}, {64, 1}, count * (words * 4 + 16), static_cast<cl_int>(first),
+        work.launch(prepared.program, "depth_count", {count, 1}, {64, 1}, count * (words * 4 + 16), static_cast<cl_int>(first),
                     static_cast<cl_int>(count), static_cast<cl_int>(prepared.samples), cl_int{0}, on_points, blocked, cl::Buffer(), cl::Buffer(),
                     shaded.visibility, cl::Buffer(), cl::Buffer());
     }

@@ -22,6 +22,7 @@ struct DeviceDepthImage {
 
 struct PreparedDepthTrace {
     DepthTrace settings;
+    opencl::Specialisation program;
     Light light;
     std::shared_ptr<const std::vector<DeviceDepthImage>> images;
     opencl::Buffer<cl_float2> strata; // low corners

@@ -10,20 +10,35 @@ namespace {
 
 constexpr double most_taps = 16;
 
+// From where to where a slice comes to count for a receiver (3.4.2).
+struct Fade {
+    double from, to;
+};
+
+// A receiver on a plane itself does not count as beyond it, whatever rounding made of its depth.
+double beyond(double far) { return far + 0x1p-20 * std::abs(far); }
+
+Fade fade_of(const std::vector<float>& depths, std::size_t slice, SelfShadow self_shadow)
+{
+    const double near = depths[slice], far = depths[slice + 1];
+    if (self_shadow == SelfShadow::own) return {near, far};
+    // What lies beyond the last caster is none of them: there a slice counts in full.
+    const bool last = slice + 2 == depths.size();
+    if (last || self_shadow == SelfShadow::omit) return {beyond(far), beyond(far)};
+    return {beyond(far), static_cast<double>(depths[slice + 2])};
+}
+
 // The slices' planes as shading needs them, all layers of each.
 std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<float>& depths, const SlicePart& part,
-                                      const OcclusionTexture& settings)
+                                      const OcclusionTexture& settings, SelfShadow self_shadow)
 {
     const bool layered = is_layered(settings);
     std::vector<OcclusionPlane> planes;
     for (std::size_t k = 0; k + 1 < depths.size(); ++k) {
-        const double near = depths[k], far = depths[k + 1], next = k + 2 < depths.size() ? depths[k + 2] : far + (far - near);
+        const double far = depths[k + 1];
         const double per = view.orthographic ? 1 : 1 / (far + static_cast<double>(view.behind));
         const double along = view.orthographic ? 1 : far * per;
-        // A receiver on the plane itself does not count as beyond it, whatever rounding made of its depth.
-        const double beyond = far + 0x1p-20 * std::abs(far);
-        const bool own = settings.self_shadow == SelfShadow::own;
-        const double from = own ? near : beyond, to = settings.self_shadow == SelfShadow::omit ? beyond : own ? far : next;
+        const Fade fade = fade_of(depths, k, self_shadow);
         OcclusionPlane plane{.slice = static_cast<int>(k),
                              .layer = -1,
                              .levels = 1,
@@ -32,8 +47,8 @@ std::vector<OcclusionPlane> planes_of(const SliceView& view, const std::vector<f
                              .half_x = static_cast<float>(part.half_u * per * view.per_x),
                              .half_y = static_cast<float>(part.half_v * per * view.per_y),
                              .far = static_cast<float>(far),
-                             .fade_from = static_cast<float>(from),
-                             .per_fade = to > from ? static_cast<float>(std::min(1 / (to - from), 1e30)) : 1e30F};
+                             .fade_from = static_cast<float>(fade.from),
+                             .per_fade = fade.to > fade.from ? static_cast<float>(std::min(1 / (fade.to - fade.from), 1e30)) : 1e30F};
         for (int layer = 0; layer < (layered ? settings.layers : 1); ++layer) {
             if (layered) plane.layer = layer;
             planes.push_back(plane);
@@ -52,6 +67,13 @@ std::array<int, 2> taps_of(const std::vector<OcclusionPlane>& planes)
     }
     const auto taps = [](double ratio) { return static_cast<int>(std::clamp(std::ceil(ratio * (1 - 0x1p-20)), 1.0, most_taps)); };
     return {taps(x / y), taps(y / x)};
+}
+
+// A receiver that does not cast has no slice of its own.
+SelfShadow self_shadow_of(const OcclusionTexture& settings, bool receivers_cast)
+{
+    if (settings.self_shadow != SelfShadow::automatic) return settings.self_shadow;
+    return receivers_cast ? SelfShadow::fade : SelfShadow::own;
 }
 
 void mark_triangles(opencl::Work& work, const opencl::Specialisation& program, const SliceScenery& scenery, const SliceView& view,
@@ -84,7 +106,7 @@ void mark_solid(opencl::Work& work, const opencl::Specialisation& program, const
 } // namespace
 
 SliceScenery slice_scenery(opencl::Work& work, const LightFrame& frame, std::span<const TriangleMesh* const> meshes, const SolidMaps* solid,
-                           const OcclusionTexture& settings)
+                           const OcclusionTexture& settings, bool receivers_cast)
 {
     SliceScenery scenery{.light = frame,
                          .casters = slice_casters(frame, meshes),
@@ -95,6 +117,7 @@ SliceScenery slice_scenery(opencl::Work& work, const LightFrame& frame, std::spa
                          .triangles = {},
                          .large = {},
                          .solid = solid,
+                         .self_shadow = self_shadow_of(settings, receivers_cast),
                          .front = {},
                          .back = {}};
     scenery.range = slice_range(scenery.casters, frame.directional);
@@ -126,13 +149,13 @@ MarkedSlices marked_slices(opencl::Work& work, const opencl::Specialisation& pro
                            const OcclusionTexture& settings)
 {
     MarkedSlices marked;
-    marked.view = slice_view(scenery.casters, scenery.range, part, settings.resolution, settings.slices, scenery.light.directional);
+    marked.view = slice_view(scenery.casters, scenery.range, part, settings, scenery.light.directional);
     const std::size_t side = static_cast<std::size_t>(settings.resolution);
     marked.occupancy = work.upload(std::span<const cl_uint>(std::vector<cl_uint>(2 * side * side)), "slices");
     mark_triangles(work, program, scenery, marked.view, marked.occupancy);
     mark_solid(work, program, scenery, marked.view, marked.occupancy);
 
-    const std::vector<OcclusionPlane> all = planes_of(marked.view, scenery.depths, part, settings);
+    const std::vector<OcclusionPlane> all = planes_of(marked.view, scenery.depths, part, settings, scenery.self_shadow);
     marked.taps = taps_of(all);
     const auto planes = work.upload(std::span<const OcclusionPlane>(all), "planes of slices");
     const auto counts = work.upload(std::span<const cl_int>(std::vector<cl_int>(all.size())), "filled texels");

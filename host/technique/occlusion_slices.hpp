@@ -30,11 +30,12 @@ struct SliceScenery {
     opencl::Buffer<float> vertices, planes;
     opencl::Buffer<cl_int> triangles, large;
     const SolidMaps* solid;
+    SelfShadow self_shadow; // not automatic
     opencl::Buffer<float> front, back;
 };
 
 SliceScenery slice_scenery(opencl::Work& work, const LightFrame& frame, std::span<const TriangleMesh* const> meshes, const SolidMaps* solid,
-                           const OcclusionTexture& settings);
+                           const OcclusionTexture& settings, bool receivers_cast);
 
 // n x n parts of the light, of even size.
 std::vector<SlicePart> slice_parts(const LightFrame& light, int splits);

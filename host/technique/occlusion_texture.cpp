@@ -20,11 +20,15 @@ constexpr Names<3> prefilter_names{"nbuffer", "mipmap", "summed_area"};
 constexpr Names<4> level_names{"nbuffer", "mipmap", "table", "smooth"}; // of LevelKind
 constexpr Names<2> storage_names{"binary32", "normalized16"};
 constexpr Names<5> combine_names{"product", "sum", "max", "layered", "layered_max"};
-constexpr Names<3> self_shadow_names{"fade", "own", "omit"};
+constexpr Names<2> projection_centre_names{"light", "behind_light"};
+constexpr Names<4> self_shadow_names{"auto", "fade", "own", "omit"};
 
 static_assert(static_cast<int>(Combine::product) == COMBINE_PRODUCT && static_cast<int>(Combine::sum) == COMBINE_SUM);
 static_assert(static_cast<int>(Combine::max) == COMBINE_MAX && static_cast<int>(Combine::layered) == COMBINE_LAYERED);
 static_assert(static_cast<int>(Combine::layered_max) == COMBINE_LAYERED_MAX);
+
+// Half the side of a square of the disc's variance, for each unit of its radius: sqrt(3) / 2.
+constexpr double square_of_disc = 0.86602540378443865;
 
 opencl::Specialisation program(int lanes, LevelKind kind, const OcclusionTexture& settings)
 {
@@ -41,8 +45,8 @@ void check_settings(const LightFrame& light, const OcclusionTexture& settings)
     const auto refuse = [](const std::string& key, const std::string& what, const std::string& expected) {
         throw Error::at(ErrorCode::invalid_input, "technique." + key, what, expected);
     };
-    if (settings.light_splits > 1 && light.directional)
-        refuse("light_splits", "is " + std::to_string(settings.light_splits) + " and the light directional",
+    if (settings.light_splits > 1 && light.shape == LightShape::disc)
+        refuse("light_splits", "is " + std::to_string(settings.light_splits) + " and the light a disc",
                "expected 1: only rectangles are split");
     if (settings.leak_fix && (settings.combine != Combine::product && settings.combine != Combine::max))
         refuse("leak_fix", "is true and combine adds slices up", "expected combine product or max: a sum would count each surface twice");
@@ -102,8 +106,10 @@ TechniqueRow row(const OcclusionTexture&)
                      choice_key<S>("placement", &S::placement, placement_names,
                                    "slices of even depth, of even 1 / depth, or with as much of the casters' area in each"),
                      integer_key<S>("resolution", &S::resolution, {4, 4096}, "texels", "along each side of a slice"),
+                     choice_key<S>("projection_centre", &S::projection_centre, projection_centre_names,
+                                   "where slices are seen from: the light's centre, or behind it (3.4), so that its edges' frustum holds the casters"),
                      choice_key<S>("prefilter", &S::prefilter, prefilter_names,
-                                   "how a slice's mean over any square is had; summed_area is exact and takes rectangles"),
+                                   "how a slice's mean over any rectangle is had: summed_area is exact; the others interpolate between squares"),
                      choice_key<S>("storage", &S::storage, storage_names, "of N-buffers and mip-maps"),
                      choice_key<S>("combine", &S::combine, combine_names,
                                    "of slices: Eq. 5, for comparison the sum and the greatest; layered: the sum within a depth layer, the "
@@ -112,11 +118,11 @@ TechniqueRow row(const OcclusionTexture&)
                      flag_key<S>("leak_fix", &S::leak_fix, "each slice is seen in the next one away from the light too (3.4.1)"),
                      choice_key<S>(
                          "self_shadow", &S::self_shadow, self_shadow_names,
-                         "near a slice: the one before the receiver's own fades in, the own one fades in, or the own one is left out at "
-                         "once (3.4.2)"),
+                         "near a receiver's own slice: fade (3.4.2) leaves it out and has the one before fade in; own has it fade in; omit leaves "
+                         "it out at once; auto is own where no receiver casts, else fade"),
                      integer_key<S>("light_splits", &S::light_splits, {1, 16}, "parts",
                                     "n x n parts of a rectangle, each with slices of its own")},
-            .lights = {"rectangle", "point", "directional"},
+            .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = false,
             .inputs =
                 "objects that cast, or front occluder depth from the light's centre (and back: the solid between; and layers); receiver "
@@ -125,12 +131,16 @@ TechniqueRow row(const OcclusionTexture&)
 }
 
 PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
-                                                   const SolidMaps* solid, const OcclusionTexture& settings)
+                                                   const SolidMaps* solid, const OcclusionTexture& settings, bool receivers_cast)
 {
     work.stage("casters");
     LightFrame frame = light_frame(light);
     check_settings(frame, settings);
     const LevelKind kind = level_kind(frame.directional, settings);
+    if (frame.shape == LightShape::disc && kind != LevelKind::smooth) {
+        frame.half_u *= square_of_disc;
+        frame.half_v *= square_of_disc;
+    }
     PreparedOcclusionTexture prepared{.settings = settings,
                                       .program = program(work.context().quirks().lanes, kind, settings),
                                       .view = light_camera(frame, {1, 1}, frame.origin),
@@ -146,7 +156,7 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
             prepared.view = light_camera(frame, {1, 1}, frame.origin);
         }
     }
-    const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings);
+    const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings, receivers_cast);
     if (scenery.depths.empty()) {
         prepared.warnings.push_back("nothing that casts lies before the light: nothing casts shadows");
         return prepared;
@@ -209,7 +219,7 @@ PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, con
     std::optional<SolidMaps> solid;
     if (casting.meshes.empty() && maps.back) solid.emplace(*maps.front, *maps.back, maps.camera);
 
-    PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings);
+    PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings, casting.receivers_cast);
     findings.view = prepared.view;
     findings.warnings.insert(findings.warnings.end(), prepared.warnings.begin(), prepared.warnings.end());
     findings.notes = prepared.notes;

@@ -27,10 +27,10 @@ struct PreparedOcclusionTexture {
     std::vector<std::string> warnings, notes;
 };
 
-// `meshes`: the surfaces that cast, in world space. Throws invalid_input for settings that do not go together or with the light, too_large
+// `meshes`: the surfaces that cast, in world space; `receivers_cast`: whether a receiver may lie on them. Throws invalid_input for settings that do not go together or with the light, too_large
 // with what would fit for more slices or texels than the device's memory holds.
 PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
-                                                   const SolidMaps* solid, const OcclusionTexture& settings);
+                                                   const SolidMaps* solid, const OcclusionTexture& settings, bool receivers_cast = true);
 
 // Writes visibility, receivers.view.height x receivers.view.width. `counts`, if any, takes the lookups as pairs.
 void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture& prepared, const ReceiverPoints& receivers,

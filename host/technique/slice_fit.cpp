@@ -8,6 +8,7 @@ namespace penumbra {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double widest_tangent = 4;
 
 struct Point {
     double x, y, z;
@@ -88,6 +89,30 @@ std::vector<double> shares_of(const std::vector<double>& bins, int slices)
     return at;
 }
 
+// How far behind the light the centre of projection lies so that the frustum through the light's edges holds the casters: at one point, along
+// x and y, half z / (|x| - half).
+double behind_for_frustum(const SliceCasters& casters, const SliceRange& range, const SlicePart& part)
+{
+    double behind_x = infinite, behind_y = infinite;
+    for_each_corner(casters, range.near, [&](const Point& p) {
+        const double out_x = std::abs(p.x - part.centre_x) - part.half_u, out_y = std::abs(p.y - part.centre_y) - part.half_v;
+        if (out_x > 0) behind_x = std::min(behind_x, part.half_u * p.z / out_x);
+        if (out_y > 0) behind_y = std::min(behind_y, part.half_v * p.z / out_y);
+    });
+    return std::min(std::max(behind_x, behind_y), range.far);
+}
+
+// The least that keeps all casters within tangents of `widest_tangent`: what lies beside the light near its plane would take the window.
+double behind_for_width(const SliceCasters& casters, const SliceRange& range, const SlicePart& part)
+{
+    double behind = 0;
+    for_each_corner(casters, range.near, [&](const Point& p) {
+        const double out = std::max(std::abs(p.x - part.centre_x), std::abs(p.y - part.centre_y));
+        behind = std::max(behind, out / widest_tangent - p.z);
+    });
+    return behind;
+}
+
 } // namespace
 
 SliceCasters slice_casters(const LightFrame& light, std::span<const TriangleMesh* const> meshes)
@@ -154,19 +179,14 @@ std::vector<float> slice_depths(const SliceCasters& casters, const SliceRange& r
     return depths;
 }
 
-SliceView slice_view(const SliceCasters& casters, const SliceRange& range, const SlicePart& part, int resolution, int slices,
+SliceView slice_view(const SliceCasters& casters, const SliceRange& range, const SlicePart& part, const OcclusionTexture& settings,
                      bool directional)
 {
-    // How far behind the light its edges' frustum opens at one point, along x and y: half z / (|x| - half).
-    double behind_x = infinite, behind_y = infinite;
-    if (!directional)
-        for_each_corner(casters, range.near, [&](const Point& p) {
-            const double out_x = std::abs(p.x - part.centre_x) - part.half_u, out_y = std::abs(p.y - part.centre_y) - part.half_v;
-            if (out_x > 0) behind_x = std::min(behind_x, part.half_u * p.z / out_x);
-            if (out_y > 0) behind_y = std::min(behind_y, part.half_v * p.z / out_y);
-        });
-    // As the device adds it.
-    const double behind = directional ? 0 : static_cast<double>(static_cast<float>(std::min(std::max(behind_x, behind_y), range.far)));
+    const int resolution = settings.resolution;
+    const double wanted = directional                                                ? 0
+                          : settings.projection_centre == ProjectionCentre::light ? behind_for_width(casters, range, part)
+                                                                                     : behind_for_frustum(casters, range, part);
+    const double behind = static_cast<double>(static_cast<float>(wanted)); // as the device adds it
 
     Vec2 low(infinite, infinite), high(-infinite, -infinite);
     for_each_corner(casters, directional ? -infinite : range.near, [&](const Point& p) {
@@ -188,7 +208,7 @@ SliceView slice_view(const SliceCasters& casters, const SliceRange& range, const
     widen(low.y, high.y);
     return {.width = resolution,
             .height = resolution,
-            .slices = slices,
+            .slices = settings.slices,
             .orthographic = directional ? 1 : 0,
             .behind = static_cast<float>(behind),
             .centre_x = static_cast<float>(part.centre_x),

@@ -44,10 +44,11 @@ struct SlicePart {
     double centre_x = 0, centre_y = 0, half_u = 0, half_v = 0;
 };
 
-// The window, `resolution` texels along each side, that just holds what casts within the range, seen from a centre behind the light (3.4,
-// Fig. 5): so far behind that the frustum through the light's edges holds the casters, by the axis that lets it be further away, and no
-// further than the casters reach (from there an orthographic view, which leaks, would be near).
-SliceView slice_view(const SliceCasters& casters, const SliceRange& range, const SlicePart& part, int resolution, int slices,
+// The window, `resolution` texels along each side, that just holds what casts within the range.
+// Centre light: seen from the part's centre. Only where casters lie at tangents beyond 4 does it move back, until they do not.
+// Centre behind_light (the paper, 3.4, Fig. 5): so far behind that the frustum through the light's edges holds the casters, by the axis that
+// lets it be further away, and no further than the casters reach (from there an orthographic view, which leaks, would be near).
+SliceView slice_view(const SliceCasters& casters, const SliceRange& range, const SlicePart& part, const OcclusionTexture& settings,
                      bool directional);
 
 } // namespace penumbra

@@ -1,7 +1,6 @@
 // Every program that can be asked for, found by walking the techniques' own keys.
 #include <set>
 
-#include "depth_image/light.hpp"
 #include "depth_image/views.hpp"
 #include "technique/occluder_maps.hpp"
 #include "technique/techniques.hpp"
@@ -46,7 +45,6 @@ std::vector<opencl::Specialisation> every_specialisation()
     };
     add(depth_fit_program());
     for (const int lanes : {1, 8, 16}) add(depth_trace_program(lanes));
-    add(horizon_program());
     add(receivers_program());
     add(occluders_program());
     for (const TechniqueRow& row : technique_table()) {

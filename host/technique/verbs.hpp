@@ -77,6 +77,8 @@ struct Casting {
     std::function<std::shared_ptr<const Tracer>()> tracer;
     // The depth images among the objects that cast, fitted (Needs::depth_images).
     std::vector<std::shared_ptr<const DepthImage>> images;
+    // Whether a receiver may lie on what casts: false only where that is known.
+    bool receivers_cast = true;
 };
 
 // What prepare has to say beside its state.

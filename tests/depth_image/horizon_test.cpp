@@ -4,6 +4,7 @@
 #include "depth_image/images.hpp"
 
 #include "depth_image/light.hpp"
+#include "technique/receiver_points.hpp"
 
 namespace penumbra::test {
 namespace {
@@ -30,7 +31,7 @@ std::vector<float> clipped(const Light& light, const DepthSurface& surface, cons
     const auto on_device = work.upload(std::span<const float>(visibility), "visibility");
     const auto points = work.upload(std::span<const DepthVector>(surface.points), "points");
     const auto normals = work.upload(std::span<const DepthVector>(surface.normals), "normals");
-    clip_at_horizon(work, {light, surface.camera, surface.width, surface.height, points.memory(), {}, normals.memory()}, channels, on_device.memory());
+    clip_at_horizon(work, receivers_program(), {light, surface.camera, surface.width, surface.height, points.memory(), {}, normals.memory()}, channels, on_device.memory());
     auto result = work.read(on_device);
     work.finish();
     return result;

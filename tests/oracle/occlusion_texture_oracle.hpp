@@ -237,15 +237,15 @@ inline Value hidden(const Scene& s, std::size_t k, const Texture& texture, doubl
 inline Value weight(const Scene& s, std::size_t k, double z)
 {
     const double near = s.depths[k], far = s.depths[k + 1];
-    const double next = k + 2 < s.depths.size() ? static_cast<double>(s.depths[k + 2]) : far + (far - near);
     const double beyond = far + 0x1p-20 * std::abs(far);
     const auto ramp = [&](double from, double to) -> Value {
         if (!(to > from)) return {z > from ? 1.0 : 0.0, 0};
         const double at = (z - from) / (to - from);
         return {std::clamp(at, 0.0, 1.0), at < -0x1p-10 || at > 1 + 0x1p-10 ? 0 : 4 * e * (z / (to - from) + 1)};
     };
-    if (s.settings.self_shadow == SelfShadow::omit) return ramp(beyond, beyond);
-    return s.settings.self_shadow == SelfShadow::own ? ramp(near, far) : ramp(beyond, next);
+    if (s.settings.self_shadow == SelfShadow::own) return ramp(near, far); // automatic: receivers may cast in these scenes, so fade
+    const bool last = k + 2 == s.depths.size();
+    return last || s.settings.self_shadow == SelfShadow::omit ? ramp(beyond, beyond) : ramp(beyond, static_cast<double>(s.depths[k + 2]));
 }
 
 // [slice][layer]

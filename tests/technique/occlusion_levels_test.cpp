@@ -111,17 +111,17 @@ TEST(Levels, AreMeansOfSquares)
 
 TEST(Levels, OfLayersAndOfSlicesSeenInTheNext)
 {
-    expect_levels(levelled({.slices = 9, .resolution = 33, .combine = Combine::layered, .layers = 2}), "layers");
-    expect_levels(levelled({.slices = 64, .resolution = 20, .combine = Combine::layered_max, .layers = 8}), "eight layers");
-    expect_levels(levelled({.slices = 9, .resolution = 33, .leak_fix = true}), "leak fix");
-    expect_levels(levelled({.slices = 64, .resolution = 20, .leak_fix = true}), "leak fix of 64 slices");
+    expect_levels(levelled({.slices = 9, .resolution = 33, .prefilter = Prefilter::nbuffer, .combine = Combine::layered, .layers = 2}), "layers");
+    expect_levels(levelled({.slices = 64, .resolution = 20, .prefilter = Prefilter::nbuffer, .combine = Combine::layered_max, .layers = 8}), "eight layers");
+    expect_levels(levelled({.slices = 9, .resolution = 33, .prefilter = Prefilter::nbuffer, .combine = Combine::product, .leak_fix = true}), "leak fix");
+    expect_levels(levelled({.slices = 64, .resolution = 20, .prefilter = Prefilter::nbuffer, .combine = Combine::product, .leak_fix = true}), "leak fix of 64 slices");
 }
 
 TEST(Levels, OfADirectionalLightAreSmooth)
 {
     for (const LevelStorage storage : {LevelStorage::binary32, LevelStorage::normalized16})
         for (const int resolution : {4, 17, 24}) {
-            SliceCase c = levelled({.slices = 3, .resolution = resolution, .storage = storage});
+            SliceCase c = levelled({.slices = 3, .resolution = resolution, .prefilter = Prefilter::nbuffer, .storage = storage});
             c.light = DirectionalLight{.direction = {0, 0, -1}, .angular_diameter_deg = 0.53, .up = Vec3(0, 1, 0)};
             expect_levels(c, "sun, " + std::to_string(resolution));
         }
@@ -132,7 +132,7 @@ TEST(Tables, AreCounts)
 {
     const auto context = device_context();
     for (const int resolution : {4, 31, 65}) {
-        const SliceCase c = levelled({.slices = 40, .resolution = resolution, .prefilter = Prefilter::summed_area});
+        const SliceCase c = levelled({.slices = 40, .resolution = resolution, .prefilter = Prefilter::summed_area, .combine = Combine::product});
         const slices::Scene scene = oracle_scene(context, c);
         const auto textures = slices::textures_of(scene);
         const SliceRun r = run(context, c);

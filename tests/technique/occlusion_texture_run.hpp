@@ -1,6 +1,7 @@
 // Runs occlusion_texture step by step on the device and reads back all that it built, for comparison with the oracle.
 #pragma once
 
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <vector>
@@ -99,6 +100,9 @@ inline oracle::slices::Scene oracle_scene(const std::shared_ptr<opencl::Context>
 
     LightFrame frame = light_frame(c.light);
     frame.origin = bits.view.frame.origin;
+    // A square has the variance of a disc of radius r, r^2 / 4 along each axis, where half its side, a, has a^2 / 3 = r^2 / 4.
+    const bool square = frame.shape == LightShape::disc && !(frame.directional && settings.prefilter == Prefilter::nbuffer);
+    for (double* half : {&frame.half_u, &frame.half_v}) *half *= square ? std::sqrt(0.75) : 1;
     const SliceCasters casters = slice_casters(frame, pointers_to(c.casters));
     const SliceRange range = slice_range(casters, frame.directional);
     const int splits = settings.light_splits, i = static_cast<int>(part) % splits, j = static_cast<int>(part) / splits;
@@ -106,7 +110,7 @@ inline oracle::slices::Scene oracle_scene(const std::shared_ptr<opencl::Context>
                         .centre_y = (2 * j + 1 - splits) * frame.half_v / splits,
                         .half_u = frame.half_u / splits,
                         .half_v = frame.half_v / splits};
-    oracle::slices::Scene scene{.view = slice_view(casters, range, own, settings.resolution, settings.slices, frame.directional),
+    oracle::slices::Scene scene{.view = slice_view(casters, range, own, settings, frame.directional),
                                 .depths = slice_depths(casters, range, settings.slices, settings.placement, frame.directional),
                                 .bits = {},
                                 .settings = settings,

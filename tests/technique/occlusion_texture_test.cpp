@@ -229,10 +229,11 @@ SliceCase masked(const OcclusionTexture& settings)
 
 TEST(SliceMask, EveryWayToCombine)
 {
+    for (const Prefilter prefilter : {Prefilter::nbuffer, Prefilter::summed_area})
     for (const Combine combine : {Combine::product, Combine::sum, Combine::max, Combine::layered, Combine::layered_max})
         for (const int layers : {1, 3, 8}) {
             if (layers != 3 && combine != Combine::layered) continue;
-            EXPECT_GT(expect_mask(masked({.slices = 8, .resolution = 32, .combine = combine, .layers = layers}),
+            EXPECT_GT(expect_mask(masked({.slices = 8, .resolution = 32, .prefilter = prefilter, .combine = combine, .layers = layers}),
                                   "combine " + std::to_string(static_cast<int>(combine))),
                       40);
         }
@@ -250,11 +251,11 @@ TEST(SliceMask, EveryPrefilterAndStorage)
 
 TEST(SliceMask, EverySelfShadowAndPlacementAndLeakFix)
 {
-    for (const SelfShadow self : {SelfShadow::fade, SelfShadow::own, SelfShadow::omit})
+    for (const SelfShadow self : {SelfShadow::automatic, SelfShadow::fade, SelfShadow::own, SelfShadow::omit})
         for (const Placement placement : {Placement::uniform, Placement::reciprocal, Placement::occupied})
             for (const bool leak_fix : {false, true})
                 EXPECT_GT(
-                    expect_mask(masked({.slices = 6, .placement = placement, .resolution = 32, .leak_fix = leak_fix, .self_shadow = self}),
+                    expect_mask(masked({.slices = 6, .placement = placement, .resolution = 32, .combine = Combine::product, .leak_fix = leak_fix, .self_shadow = self}),
                                 "self shadow " + std::to_string(static_cast<int>(self))),
                     40);
 }

@@ -87,16 +87,17 @@ TEST(SliceDepths, OccupiedSharesTheArea)
     for (const float z : slice_depths(one, slice_range(one, false), 5, Placement::occupied, false)) EXPECT_EQ(z, 4.0f);
 }
 
-// Every caster's texel lies within the window, and the window is no larger than it must be; the centre of projection lies behind the light.
+// Every caster's texel lies within the window, and the window is no larger than it must be; the centre of projection lies at the light or behind it.
 TEST(SliceViewOf, JustHoldsTheCasters)
 {
+    for (const ProjectionCentre centre : {ProjectionCentre::light, ProjectionCentre::behind_light})
     for (const double half : {0.0, 0.01, 1.0, 50.0})
         for (const bool directional : {false, true})
             for (const int resolution : {4, 333}) {
                 const SliceCasters casters = casters_of({triangles_in(50, {-2, -1, 3}, {3, 2, 6}, 0.5, 1)});
                 const SliceRange range = slice_range(casters, directional);
                 const SlicePart part{.centre_x = 0.25, .centre_y = -0.5, .half_u = half, .half_v = half / 2};
-                const SliceView view = slice_view(casters, range, part, resolution, 7, directional);
+                const SliceView view = slice_view(casters, range, part, {.slices = 7, .resolution = resolution, .projection_centre = centre}, directional);
                 EXPECT_EQ(view.width, resolution);
                 EXPECT_EQ(view.slices, 7);
                 EXPECT_EQ(view.orthographic, directional ? 1 : 0);
@@ -121,19 +122,33 @@ TEST(SliceViewOf, JustHoldsTheCasters)
             }
 }
 
+// From the light's centre, unless casters lie far beside it near its plane: there the centre moves back until the widest tangent is 4.
+TEST(SliceViewOf, SeesFromTheLight)
+{
+    const SlicePart part{.centre_x = 1, .centre_y = 0, .half_u = 1, .half_v = 1};
+    const auto behind = [&](const TriangleMesh& mesh) {
+        const SliceCasters casters = casters_of({mesh});
+        return slice_view(casters, slice_range(casters, false), part, {}, false).behind;
+    };
+    EXPECT_EQ(behind(sheet(-15, 17, -16, 16, 4)), 0);
+    EXPECT_FLOAT_EQ(behind(sheet(-15, 17, -20, 16, 4)), 1); // 20 / 4 - 4
+    EXPECT_FLOAT_EQ(behind(sheet(-15, 25, -16, 16, 4)), 2); // 24 / 4 - 4
+}
+
 // The frustum from behind the light through the light's edges holds the casters (3.4, Fig. 5) along the axis that it was fitted to.
 TEST(SliceViewOf, SeesThroughTheLightsEdges)
 {
     // A square light of half extent 1 and a caster that reaches out to 3 at depth 4: the frustum opens half z / (|x| - half) = 2 behind the
     // light.
+    const OcclusionTexture paper{.slices = 1, .resolution = 8, .projection_centre = ProjectionCentre::behind_light};
     const SliceCasters casters = casters_of({sheet(-3, 3, -3, 3, 4)});
     const SlicePart part{.centre_x = 0, .centre_y = 0, .half_u = 1, .half_v = 1};
-    EXPECT_FLOAT_EQ(slice_view(casters, slice_range(casters, false), part, 8, 1, false).behind, 2);
+    EXPECT_FLOAT_EQ(slice_view(casters, slice_range(casters, false), part, paper, false).behind, 2);
     // Casters no wider than the light: no further than they reach.
     const SliceCasters narrow = casters_of({sheet(-1, 1, -0.5, 0.5, 4)});
-    EXPECT_FLOAT_EQ(slice_view(narrow, slice_range(narrow, false), part, 8, 1, false).behind, 4);
+    EXPECT_FLOAT_EQ(slice_view(narrow, slice_range(narrow, false), part, paper, false).behind, 4);
     // A point light sees from where it is.
-    EXPECT_EQ(slice_view(casters, slice_range(casters, false), {}, 8, 1, false).behind, 0);
+    EXPECT_EQ(slice_view(casters, slice_range(casters, false), {}, paper, false).behind, 0);
 }
 
 // A caster without width or height, or both, still has a window with area.
@@ -146,7 +161,7 @@ TEST(SliceViewOf, OfLinesAndPointsHasArea)
         for (const bool directional : {false, true}) {
             const SliceCasters casters = casters_of({mesh_of({corners[0], corners[1], corners[2]}, {{0, 1, 2}})});
             const SliceView view = slice_view(casters, slice_range(casters, directional),
-                                              {.centre_x = 0, .centre_y = 0, .half_u = 1, .half_v = 1}, 64, 4, directional);
+                                              {.centre_x = 0, .centre_y = 0, .half_u = 1, .half_v = 1}, {.slices = 4, .resolution = 64}, directional);
             EXPECT_TRUE(std::isfinite(view.per_x) && std::isfinite(view.per_y) && view.per_x > 0 && view.per_y > 0);
             EXPECT_TRUE(std::isfinite(view.low_x) && std::isfinite(view.low_y));
         }

@@ -6,7 +6,8 @@ namespace penumbra {
 enum class Placement { uniform, reciprocal, occupied };
 enum class Prefilter { nbuffer, mipmap, summed_area };
 enum class Combine { product, sum, max, layered, layered_max };
-enum class SelfShadow { fade, own, omit };
+enum class SelfShadow { automatic, fade, own, omit };
+enum class ProjectionCentre { light, behind_light };
 enum class LevelStorage { binary32, normalized16 };
 
 // Occlusion textures (Eisemann, Decoret, Occlusion Textures for Plausible Soft Shadows, 2008): the casters cut into slices parallel to the
@@ -17,14 +18,17 @@ struct OcclusionTexture {
     Placement placement =
         Placement::uniform; // of the slices along the light's axis: even in depth (3.4), in its reciprocal, or in the casters' area
     int resolution = 256;   // texels along each side of a slice
-    Prefilter prefilter = Prefilter::nbuffer;          // 3.2
+    ProjectionCentre projection_centre =
+        ProjectionCentre::light; // the slices are seen from the light's centre, or from so far behind it that its edges' frustum holds the casters (3.4)
+    Prefilter prefilter = Prefilter::summed_area;      // 3.2
     LevelStorage storage = LevelStorage::normalized16; // of N-buffers and mip-maps
     Combine combine =
-        Combine::product;  // of slices (3.3, Eq. 5); layered: the sum within each depth layer, the product or the greatest across them
+        Combine::layered_max; // of slices: Eq. 5 (3.3) is product; layered: the sum within each depth layer, the product or the greatest across them
     int layers = 4;        // layered: depth layers, the last of which takes all that lies behind
     bool leak_fix = false; // each slice is seen in the next one away from the light too (3.4.1)
-    SelfShadow self_shadow =
-        SelfShadow::fade; // 3.4.2: fade: a receiver's own slice is left out and the one before fades in with the distance from it
+    // fade (3.4.2): a receiver's own slice is left out, and the one before fades in with the distance from it. own: its own fades in. omit: its
+    // own is left out at once. automatic: own where no receiver casts, else fade. What lies beyond the last caster sees every slice in full.
+    SelfShadow self_shadow = SelfShadow::automatic;
     int light_splits = 1; // n x n parts of a rectangle, each with slices of its own
 };
 
