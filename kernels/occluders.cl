@@ -80,14 +80,19 @@ inline bool explains(const float slope, const float step, const float rounding)
     return step * slope > 0.0f && fabs(step) <= 2.0f * fabs(slope) + rounding;
 }
 
-// The size of the step from a to b when they are on one surface, else 0. Each disparity is off by up to `precision` of itself, so a difference
-// by twice that, and a doubled slope by twice that again.
-inline float joined_step(const float before, const float a, const float b, const float after, const float precision)
+// Whether a and b are on one surface. Each disparity is off by up to `precision` of itself, so a difference by twice that, and a doubled slope by
+// twice that again.
+inline bool is_joined(const float before, const float a, const float b, const float after, const float precision)
 {
     const float step = b - a, rounding = 6.0f * precision * fmax(a, b);
-    const bool joined = a > 0.0f && b > 0.0f
-                        && (fabs(step) <= rounding || (before > 0.0f && explains(a - before, step, rounding)) || (after > 0.0f && explains(after - b, step, rounding)));
-    return joined ? fabs(step) : 0.0f;
+    return a > 0.0f && b > 0.0f
+           && (fabs(step) <= rounding || (before > 0.0f && explains(a - before, step, rounding)) || (after > 0.0f && explains(after - b, step, rounding)));
+}
+
+// The size of the step from a to b when they are on one surface, else 0.
+inline float joined_step(const float before, const float a, const float b, const float after, const float precision)
+{
+    return is_joined(before, a, b, after, precision) ? fabs(b - a) : 0.0f;
 }
 
 // slope_steps: how much the surface's disparity changes from one texel to the next, across and down: the larger of the steps to the two

@@ -14,58 +14,9 @@
 #include "receivers.cl"
 #include "common/lanes.clh"
 #include "common/half_rounding.clh"
-#include "common/own_surface.clh"
+#include "common/patch_limits.clh"
+#include "common/patch_search.clh"
 #include "common/stop.clh"
-
-// From which disparity on an occluder counts for a receiver whose own plane is not known: d + bias.
-//
-// A receiver on the occluder map's own surface must not be shadowed by the stairs that the micro-patches make of that surface. Take the
-// surface as a plane with disparity steps (sx, sy) a texel, the receiver on it, and D = d_texel - d_receiver. A texel reaches the light only
-// where |a - xi| <= h/2 + D/(2k) on both axes (the penumbra extent), and D = gx (a - xi) + gy (b - eta), so with g h = s
-//     D (1 - sx / (2 kx hx) - sy / (2 ky hy)) <= (sx + sy) / 2.
-// No texel of the plane counts, then, if the limit is that far above. Where the bracket is not positive the light's own plane is edge-on to
-// the surface and no bound exists; it is held at 1/4 (a bias of two texel steps).
-// Which texels are of the receiver's surface: common/own_surface.clh. Elsewhere only rounding counts.
-inline floatn limits_of(const OccluderView occluders, const float bias, const float precision, __global const float2* texels,
-                        __global const float2* steps, const floatn xi, const floatn eta, const floatn d, const intn known)
-{
-    float column[LANES], row[LANES], disparity[LANES], step_x[LANES], step_y[LANES];
-    int skipped[LANES];
-    store_int_lanes(known, skipped);
-    store_lanes((xi + 1.0f) * (0.5f * occluders.width), column);
-    store_lanes((1.0f - eta) * (0.5f * occluders.height), row);
-    store_lanes(d, disparity);
-    for (int lane = 0; lane < LANES; ++lane) {
-        const float2 own = skipped[lane] ? (float2)(0.0f) : own_steps((int2)(occluders.width, occluders.height), texels, steps, (float2)(column[lane], row[lane]), disparity[lane], precision);
-        step_x[lane] = own.x;
-        step_y[lane] = own.y;
-    }
-
-    const floatn sx = load_lanes(step_x), sy = load_lanes(step_y);
-    const floatn bracket = 1.0f - (sx * occluders.edge_on_x + sy * occluders.edge_on_y);
-    const floatn slope = bias * 0.5f * (sx + sy) / select_lanes((floatn)(0.25f), bracket, bracket > 0.25f);
-    return d + (8.0f * 0x1p-24f + 2.0f * precision) * d + slope;
-}
-
-// From which disparity on occluders count for receivers: above `least`, and above their own plane, which is level + slope_xi xi + slope_eta eta.
-// A texel of the plane itself lies on it at the texel's middle; half a texel's steps more leave room for surfaces that bend.
-// Where no plane is known the slopes are 0.
-typedef struct {
-    floatn least, level, slope_xi, slope_eta;
-} Limits;
-
-inline Limits limits_with_planes(const OccluderView occluders, const float bias, const float precision, const int has_planes, __global const float2* texels,
-                                 __global const float2* steps, const floatn slope_xi, const floatn slope_eta, const floatn xi, const floatn eta, const floatn d)
-{
-    const intn known = has_planes ? slope_xi != NO_PLANE : (intn)(0);
-    const Limits flat = {limits_of(occluders, bias, precision, texels, steps, xi, eta, d, known), (floatn)(-MAXFLOAT), (floatn)(0.0f), (floatn)(0.0f)};
-    if (!has_planes) return flat;
-    const floatn gx = select_lanes((floatn)(0.0f), slope_xi, known), gy = select_lanes((floatn)(0.0f), slope_eta, known);
-    const floatn least = d + (8.0f * 0x1p-24f + 2.0f * precision) * d;
-    const floatn level = least + bias * 0.5f * (fabs(gx) * occluders.texel_x + fabs(gy) * occluders.texel_y) - gx * xi - gy * eta;
-    const Limits limits = {select_lanes(flat.least, least, known), select_lanes(flat.level, level, known), gx, gy};
-    return limits;
-}
 
 // Adds u v to a sum. With binary32 the product is not rounded on its own.
 #if ACCUMULATOR == ACCUMULATOR_BINARY32
@@ -83,36 +34,6 @@ inline Limits limits_with_planes(const OccluderView occluders, const float bias,
 // Blending into a 16-bit buffer: the fragment's value and the sum are both rounded to binary16.
 #define ACCUMULATE(sum, lost, u, v) (sum) = round_to_half((sum) + round_to_half((u) * (v)))
 #endif
-
-// What a tile's search needs of the occluder map and the light.
-typedef struct {
-    float8 box;                // of the tile's receivers, as tile_bounds wrote it
-    float2 half_inverse_scale; // 1 / (2 k)
-    float2 texel;              // width and height in xi and eta
-} Search;
-
-// How far the penumbra of a texel at disparity `nearest` reaches beyond its edges on the tile's furthest receivers (through a
-// point at d_p a receiver sees the light e = (d - d_p) / (2 k) to either side). Widened by 2^-20, which covers the rounding of this search and
-// of the pairs that it spares: a texel that it drops would have added exactly 0. Negative: not above the furthest receiver, so none.
-inline float2 penumbra_extent(const Search search, const float nearest)
-{
-    const float rise = nearest - search.box.s4;
-    const float2 extent = rise * search.half_inverse_scale;
-    return rise > 0.0f ? fma((float2)(0x1p-20f), 1.0f + extent, extent) : (float2)(-1.0f);
-}
-
-// The cells (texels, blocks, superblocks) whose penumbra can meet the tile's box: (first x, first y, last x, last y), the last ones not
-// included. Cell (i, j) of size `cell` lies at xi = i cell.x - 1 and eta = 1 - (j + 1) cell.y; none holds anything nearer than `nearest`. Only cells
-// from `low` to below `high`. The 1/16 of a cell covers the rounding of places: at 65536 texels a side, 3 roundings of 2^-24 come to 0.012.
-inline int4 window(const Search search, const float nearest, const float2 cell, const int2 low, const int2 high)
-{
-    const float2 extent = penumbra_extent(search, nearest);
-    if (extent.x < 0.0f) return (int4)(0);
-    const float2 first = (float2)(search.box.s0 - extent.x + 1.0f, 1.0f - search.box.s3 - extent.y) / cell - (17.0f / 16.0f);
-    const float2 last = (float2)(search.box.s1 + extent.x + 1.0f, 1.0f - search.box.s2 + extent.y) / cell + (17.0f / 16.0f);
-    const float2 lowest = convert_float2(low), highest = convert_float2(high);
-    return (int4)(convert_int2(ceil(clamp(first, lowest, highest))), convert_int2(floor(clamp(last, lowest, highest))));
-}
 
 // A texel that can hide some of the light from the tile, and where its left and right edges lie.
 typedef struct {
@@ -158,19 +79,6 @@ inline int patches_of_row(Patch* patches, __global const float2* texels, const i
         ++found;
     }
     return found;
-}
-
-// Writes LANES values of a row, or as many of them as lie in it; with `merge` where they are smaller than what is there.
-inline void write_visibility(__global float* to, const floatn seen, const int left, const int merge)
-{
-    if (left >= LANES) {
-        const floatn before = merge ? load_lanes(to) : seen;
-        store_lanes(select_lanes(before, seen, seen < before), to);
-        return;
-    }
-    float lanes[LANES];
-    store_lanes(seen, lanes);
-    for (int lane = 0; lane < left; ++lane) to[lane] = merge && to[lane] < lanes[lane] ? to[lane] : lanes[lane];
 }
 
 // soft_shadow_map: the share of the light that each receiver sees past the micro-patches of one occluder map.

@@ -12,6 +12,7 @@ namespace {
 
 constexpr WorkKind projections{"receivers.resolution", WorkAmount::Unit::pairs, "pairs of occluder texel and receiver"};
 
+constexpr Names<2> visibility_names{"sum", "union"};
 constexpr Names<3> sides_names{"front", "back", "both"};
 constexpr Names<2> reduction_names{"area", "nearest"};
 constexpr Names<3> accumulator_names{"binary32", "compensated", "binary16"};
@@ -20,7 +21,21 @@ MapSize blocks_of(MapSize size) { return {(size.width + BLOCK - 1) / BLOCK, (siz
 
 std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height); }
 
+cl_int2 dimensions(MapSize size) { return {{size.width, size.height}}; }
+
+constexpr int patch_floats = 8; // MicroPatch of soft_shadow_union.cl
+
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
+
+// The levels above `cells`, of which every `stride`-th float counts.
+void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, MapSize size, int stride, const cl::Buffer& cells, const cl::Buffer& blocks,
+                   const cl::Buffer& superblocks)
+{
+    const MapSize level_1 = blocks_of(size), level_2 = blocks_of(level_1);
+    work.launch(prepared.program, "nearest_of_block", grid_of(level_1), {16, 4}, count_of(size) * 8, dimensions(size), stride, cells, dimensions(level_1), blocks);
+    work.launch(prepared.program, "nearest_of_block", grid_of(level_2), {16, 4}, count_of(level_1) * 4, dimensions(level_1), 1, blocks, dimensions(level_2),
+                superblocks);
+}
 
 PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
                                          MapSize size)
@@ -28,15 +43,21 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
     const MapSize blocks = blocks_of(size), superblocks = blocks_of(blocks);
     PreparedSoftShadowMap::Side side{
         .map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program),
+        .patches = {},
         .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
         .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
-    const cl_int2 texels{{size.width, size.height}}, level_1{{blocks.width, blocks.height}},
-        level_2{{superblocks.width, superblocks.height}};
-    work.launch(prepared.program, "nearest_of_block", grid_of(blocks), {16, 4}, count_of(size) * 8, texels, 2, side.map.texels, level_1,
-                side.blocks);
-    work.launch(prepared.program, "nearest_of_block", grid_of(superblocks), {16, 4}, count_of(blocks) * 4, level_1, 1, side.blocks, level_2,
-                side.superblocks);
+    if (prepared.settings.visibility == PatchVisibility::sum) build_pyramid(work, prepared, size, 2, side.map.texels.memory(), side.blocks.memory(), side.superblocks.memory());
     return side;
+}
+
+// The patches of a side, which know the other's.
+void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, PreparedSoftShadowMap::Side& side, const PreparedSoftShadowMap::Side* other, MapSize size)
+{
+    side.patches = work.buffer<float>(count_of(size) * patch_floats, "micro-patches");
+    const float precision = static_cast<float>(prepared.precision);
+    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + 4 * patch_floats), dimensions(size), precision,
+                static_cast<cl_int>(other != nullptr), side.map.texels, other ? other->map.texels.memory() : cl::Buffer(), side.patches);
+    build_pyramid(work, prepared, size, patch_floats, side.patches.memory(), side.blocks.memory(), side.superblocks.memory());
 }
 
 // Rows of a tile that one work-item owns: all of them, or on devices that vectorise by themselves one.
@@ -45,6 +66,9 @@ int item_rows(int lanes) { return lanes == 1 ? 1 : tile_rows; }
 // The program with every kernel that the technique launches.
 opencl::Specialisation program(const SoftShadowMap& settings, int lanes)
 {
+    if (settings.visibility == PatchVisibility::united)
+        return {"soft_shadow_union.cl",
+                {{"LANES", std::to_string(lanes)}, {"ITEM_ROWS", std::to_string(item_rows(lanes))}, {"TILE_ROWS", std::to_string(tile_rows)}}};
     return {"soft_shadow_map.cl",
             {{"LANES", std::to_string(lanes)},
              {"ITEM_ROWS", std::to_string(item_rows(lanes))},
@@ -70,6 +94,22 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
     work.launch(prepared.program, "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
                 side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
+}
+
+// All maps at once.
+void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds,
+                 const cl::Buffer& visibility, const opencl::Buffer<cl_uint>& evaluated)
+{
+    const int device_lanes = work.context().quirks().lanes;
+    const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
+    const auto lanes = static_cast<std::size_t>(device_lanes), rows = static_cast<std::size_t>(item_rows(device_lanes));
+    const std::array<std::size_t, 2> group = lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
+    const PreparedSoftShadowMap::Side &first = prepared.sides.front(), &second = prepared.sides.back();
+    work.launch(prepared.program, "soft_shadow_union", {width / lanes, height / rows}, group, width * height * 16 + first.patches.bytes() * prepared.sides.size(),
+                receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
+                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), first.patches, second.patches,
+                first.map.texels, first.map.steps, second.map.texels, second.map.steps, first.blocks, first.superblocks, second.blocks, second.superblocks, bounds,
+                receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }
 
 // Says what shading will take before it begins.
@@ -105,7 +145,9 @@ TechniqueRow row(const SoftShadowMap&)
         .kind = "soft_shadow_map",
         .summary = "Micro-patches: every texel of the occluder map is projected back onto the light and its share is summed.",
         .source = "Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion: Soft Shadow Maps, 2006",
-        .keys = {choice_key<S>("sides", &S::sides, sides_names, "which occluder maps are used; both merges them by the larger occlusion"),
+        .keys = {choice_key<S>("visibility", &S::visibility, visibility_names,
+                               "how patches are joined: union hides each of 32 x 32 samples of the light once; sum adds shares up (3.4, 3.5)"),
+                 choice_key<S>("sides", &S::sides, sides_names, "which occluder maps are used; both merges them by the larger occlusion"),
                  integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
                                 "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
                  choice_key<S>("reduction", &S::reduction, reduction_names,
@@ -137,6 +179,9 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
     if (settings.sides != Sides::back) prepared.sides.push_back(prepare_side(work, prepared, depth.front, from, size));
     if (settings.sides != Sides::front) prepared.sides.push_back(prepare_side(work, prepared, depth.back, from, size));
 
+    if (settings.visibility == PatchVisibility::united)
+        for (std::size_t i = 0; i < prepared.sides.size(); ++i)
+            add_patches(work, prepared, prepared.sides[i], prepared.sides.size() == 2 ? &prepared.sides[1 - i] : nullptr, size);
     for (const auto& side : prepared.sides)
         for (const float d : work.read(side.superblocks)) prepared.nearest = std::max(prepared.nearest, d);
     return prepared;
@@ -153,7 +198,8 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
 
     work.launch(prepared.program, "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view, prepared.nearest,
                 half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
-    for (std::size_t i = 0; i < prepared.sides.size(); ++i)
+    if (prepared.settings.visibility == PatchVisibility::united) shade_union(work, prepared, receivers, bounds, visibility, evaluated);
+    for (std::size_t i = 0; i < prepared.sides.size() && prepared.settings.visibility == PatchVisibility::sum; ++i)
         shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
     if (!counts) return;

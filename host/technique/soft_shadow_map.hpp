@@ -14,6 +14,7 @@ struct PreparedSoftShadowMap {
     // One occluder map and its pyramid: the nearest disparity in each block of texels, and in each block of blocks.
     struct Side {
         OccluderMap map;
+        opencl::Buffer<float> patches; // of the union: MicroPatch of soft_shadow_union.cl, each
         opencl::Buffer<float> blocks, superblocks;
     };
     SoftShadowMap settings;

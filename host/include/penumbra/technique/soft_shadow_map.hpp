@@ -6,10 +6,14 @@ namespace penumbra {
 enum class Sides { front, back, both };
 enum class Accumulator { binary32, compensated, binary16 };
 enum class Reduction { area, nearest };
+enum class PatchVisibility { sum, united };
 
 // Soft Shadow Maps (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006): each texel of the occluder map is a micro-patch
-// parallel to the light; its back-projection's share of the light is summed.
+// parallel to the light; its back-projection hides a share of the light.
 struct SoftShadowMap {
+    // united (`union` in scene files): which of 32 x 32 samples of the light the patches of all maps hide, each once. sum: the paper's, the shares
+    // added up, and of two maps the larger.
+    PatchVisibility visibility = PatchVisibility::sum;
     Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
     int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
     Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`

@@ -1,0 +1,261 @@
+// Soft Shadow Maps with a union: which of 32 x 32 samples of the light the micro-patches of one or two occluder maps hide, a bit each.
+//
+// Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. The samples are the
+// same for every receiver: (i, k) lies at u = (i + r(k)) / 32, v = (k + r(i)) / 32, r(j) = (j with its five bits reversed + 1/2) / 32, so that an edge
+// of any direction is resolved to about 1/1024 of the light, and the mask has no noise.
+//
+// Specialisation constants: LANES, ITEM_ROWS, TILE_ROWS as in soft_shadow_map.cl
+#include "common/choices.h"
+#include "common/shared.h"
+#include "occluders.cl"
+#include "receivers.cl"
+#include "common/lanes.clh"
+#include "common/patch_limits.clh"
+#include "common/patch_search.clh"
+#include "common/stop.clh"
+
+#define SIDE 32 // samples along each side of the light
+
+#if LANES == 1
+typedef uint uintn;
+#define as_uintn as_uint
+#define convert_uintn convert_uint
+#elif LANES == 8
+typedef uint8 uintn;
+#define as_uintn as_uint8
+#define convert_uintn convert_uint8
+#else
+typedef uint16 uintn;
+#define as_uintn as_uint16
+#define convert_uintn convert_uint16
+#endif
+
+// --- Patches -----------------
+
+// A micro-patch: a texel with a disparity for each of its edges, so that neighbours of one surface share theirs.
+typedef struct {
+    float reach;                    // the greatest of the others; 0: nothing is there
+    float middle;                   // the texel's own
+    float left, right, bottom, top; // of its edges
+    float unused_0, unused_1;
+} MicroPatch;
+
+// The disparity of the edge between a texel (d) and the one beside it. inner, outer: the texels on either side, with those behind them; middle: halfway
+// between the front and the back of what the texel shows.
+//
+// Shared with a neighbour of the same surface it is the mean of the two. At a silhouette the surface falls off towards its rim: a round one as a square
+// root, of which the last texel's middle shows the slope; it ends where front and back meet.
+inline float edge_disparity(const float behind_inner, const float inner, const float d, const float outer, const float behind_outer, const float middle,
+                            const float precision)
+{
+    if (is_joined(inner, d, outer, behind_outer, precision)) return 0.5f * (d + outer);
+    if (!is_joined(behind_inner, inner, d, outer, precision)) return middle;
+    const float slope = d - inner, towards = middle - d;
+    // Away from where front and back meet it is no rim but the plane's own slope.
+    if (slope * towards <= 0.0f) return fmax(fma(0.5f, slope, d), 0.5f * d);
+    return towards < 0.0f ? fmax(fma(1.4f, slope, d), middle) : fmin(fma(1.4f, slope, d), middle);
+}
+
+inline float disparity_at(__global const float2* texels, const int2 size, const int x, const int y)
+{
+    return x >= 0 && y >= 0 && x < size.x && y < size.y ? texels[y * size.x + x].x : 0.0f;
+}
+
+// micro_patches: the patches of a map.
+//
+//   texels, others [height][width]   (disparity, covered share) of the map and of the other side's; has_others: whether there is one
+//   patches [height][width]
+__kernel void micro_patches(const int2 size, const float precision, const int has_others, __global const float2* restrict texels,
+                            __global const float2* restrict others, __global MicroPatch* restrict patches)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const int at = y * size.x + x;
+    const float d = texels[at].x;
+    MicroPatch patch = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+    if (d > 0.0f) {
+        const float other = has_others ? others[at].x : 0.0f, middle = other > 0.0f ? 0.5f * (d + other) : d;
+        float row[5], column[5];
+        for (int i = 0; i < 5; ++i) {
+            row[i] = disparity_at(texels, size, x + i - 2, y);
+            column[i] = disparity_at(texels, size, x, y + i - 2);
+        }
+        patch.middle = d;
+        patch.left = edge_disparity(row[4], row[3], d, row[1], row[0], middle, precision);
+        patch.right = edge_disparity(row[0], row[1], d, row[3], row[4], middle, precision);
+        patch.top = edge_disparity(column[4], column[3], d, column[1], column[0], middle, precision);
+        patch.bottom = edge_disparity(column[0], column[1], d, column[3], column[4], middle, precision);
+        patch.reach = fmax(fmax(d, fmax(patch.left, patch.right)), fmax(patch.top, patch.bottom));
+    }
+    patches[at] = patch;
+}
+
+// --- Bits -----------------
+
+// Columns i with r(i) below m / 32 less half a step: the first m in the order of their reversed bits.
+__constant uint columns_below[SIDE + 1] = {
+    0x00000000u, 0x00000001u, 0x00010001u, 0x00010101u, 0x01010101u, 0x01010111u, 0x01110111u, 0x01111111u, 0x11111111u, 0x11111115u, 0x11151115u,
+    0x11151515u, 0x15151515u, 0x15151555u, 0x15551555u, 0x15555555u, 0x55555555u, 0x55555557u, 0x55575557u, 0x55575757u, 0x57575757u, 0x57575777u,
+    0x57775777u, 0x57777777u, 0x77777777u, 0x7777777fu, 0x777f777fu, 0x777f7f7fu, 0x7f7f7f7fu, 0x7f7f7fffu, 0x7fff7fffu, 0x7fffffffu, 0xffffffffu};
+
+// r(k), the phase of a row's samples, of a column.
+__constant float phases[SIDE] = {
+    0.015625f, 0.515625f, 0.265625f, 0.765625f, 0.140625f, 0.640625f, 0.390625f, 0.890625f, 0.078125f, 0.578125f, 0.328125f,
+    0.828125f, 0.203125f, 0.703125f, 0.453125f, 0.953125f, 0.046875f, 0.546875f, 0.296875f, 0.796875f, 0.171875f, 0.671875f,
+    0.421875f, 0.921875f, 0.109375f, 0.609375f, 0.359375f, 0.859375f, 0.234375f, 0.734375f, 0.484375f, 0.984375f};
+
+// Where an edge lies in the light, in samples: 0 to SIDE.
+inline floatn samples_at(const float edge, const floatn place, const float disparity, const floatn own, const floatn least, const float scale)
+{
+    const floatn d = select_lanes(least, (floatn)(disparity), (floatn)(disparity) > least);
+    const floatn at = fma((edge - place) * scale, (float)SIDE / (d - own), (floatn)(0.5f * SIDE));
+    const floatn low = select_lanes((floatn)(0.0f), at, at > (floatn)(0.0f));
+    return select_lanes((floatn)(SIDE), low, low < (floatn)(SIDE));
+}
+
+// The samples' columns from ceil(u) on.
+inline uintn columns_from(const floatn u)
+{
+    const uintn first = convert_uintn(ceil(u));
+    return select_lanes((uintn)(0u), (uintn)(0xffffffffu) << (first & 31u), first < 32u);
+}
+
+// Columns whose samples lie below `part` of a row, 0 to 1.
+inline uintn columns_in(const floatn part)
+{
+    int counts[LANES];
+    uint columns[LANES];
+    store_int_lanes(convert_intn(ceil(fma(part, (floatn)(SIDE), (floatn)(-0.5f)))), counts);
+    for (int lane = 0; lane < LANES; ++lane) columns[lane] = columns_below[clamp(counts[lane], 0, SIDE)];
+    return load_lanes(columns);
+}
+
+inline float lowest_of(const floatn v)
+{
+    float lanes[LANES], low = MAXFLOAT;
+    store_lanes(v, lanes);
+    for (int lane = 0; lane < LANES; ++lane) low = lanes[lane] < low ? lanes[lane] : low;
+    return low;
+}
+
+// A row of patches that can hide some of the light from a tile.
+typedef struct {
+    MicroPatch patch;
+    float a0, a1; // its left and right edges
+} Candidate;
+
+// Sets what a patch hides from LANES receivers.
+inline void hide(uintn* bits, const Candidate candidate, const float b0, const float b1, const float2 scale, const floatn xi, const floatn eta, const floatn d,
+                 const Limits limits, const floatn plane)
+{
+    const MicroPatch p = candidate.patch;
+    const float middle = 0.5f * (candidate.a0 + candidate.a1);
+    const intn counts = (p.middle > limits.least) & (p.middle > fma((floatn)(middle), limits.slope_xi, plane));
+    const floatn v_bottom = samples_at(b0, eta, p.bottom, d, limits.least, scale.y), v_top = samples_at(b1, eta, p.top, d, limits.least, scale.y);
+    const floatn v0 = select_lanes(v_bottom, v_top, v_top < v_bottom), v1 = select_lanes(v_top, v_bottom, v_top < v_bottom);
+    const floatn u_left = samples_at(candidate.a0, xi, p.left, d, limits.least, scale.x), u_right = samples_at(candidate.a1, xi, p.right, d, limits.least, scale.x);
+    const floatn u0 = select_lanes(u_left, u_right, u_right < u_left), u1 = select_lanes(u_right, u_left, u_right < u_left);
+    const intn some = counts & (u1 > u0) & (v1 > v0);
+    if (NONE(some)) return;
+
+    const floatn first = floor(v0), last = floor(v1);
+    const uintn low = ~columns_in(v0 - first), high = columns_in(v1 - last);
+    const int from = convert_int(lowest_of(select_lanes((floatn)(SIDE), first, some))),
+              to = min(convert_int(-lowest_of(select_lanes((floatn)(0.0f), -last, some))), SIDE - 1);
+    for (int k = from; k <= to; ++k) {
+        const floatn row = (floatn)(k), phase = (floatn)(phases[k]);
+        uintn columns = columns_from(u0 - phase) & ~columns_from(u1 - phase);
+        columns &= select_lanes((uintn)(0u), select_lanes((uintn)(0xffffffffu), low, row == first), some & (row >= first));
+        columns &= select_lanes((uintn)(0u), select_lanes((uintn)(0xffffffffu), high, row == last), row <= last);
+        bits[k] |= columns;
+    }
+}
+
+// The texels of row j from `first` to below `last` with something above the tile's furthest receiver; at most BLOCK.
+inline int candidates_of_row(Candidate* candidates, __global const MicroPatch* patches, const int width, const Search search, const int j, const int first, const int last)
+{
+    int found = 0;
+    for (int i = first; i < last; ++i) {
+        const MicroPatch patch = patches[j * width + i];
+        if (!(patch.middle > search.box.s4)) continue;
+        candidates[found].patch = patch;
+        candidates[found].a0 = i * search.texel.x - 1.0f;
+        candidates[found].a1 = (i + 1) * search.texel.x - 1.0f;
+        ++found;
+    }
+    return found;
+}
+
+// soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `sides` occluder maps of one size.
+//
+//   nearest                            the greatest disparity on the maps
+//   patches_i [height][width]; blocks_i, superblocks_i: pyramids of their reach; of one map, the second is not read
+//   texels_i, steps_i [height][width]  of the maps, for receivers whose plane is not known
+//   the rest                           as in soft_shadow_map.cl
+__kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int sides, const float nearest, const float bias,
+                                const float precision, const int has_planes, __global const MicroPatch* restrict patches_0, __global const MicroPatch* restrict patches_1,
+                                __global const float2* restrict texels_0, __global const float2* restrict steps_0, __global const float2* restrict texels_1,
+                                __global const float2* restrict steps_1, __global const float* restrict blocks_0, __global const float* restrict superblocks_0,
+                                __global const float* restrict blocks_1, __global const float* restrict superblocks_1, __global const float8* restrict bounds,
+                                __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
+                                __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
+                                __global uint* restrict evaluated, __global const volatile int* stop)
+{
+    const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
+    if (x >= receivers.stride || y >= receivers.rows) return;
+    const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
+
+    uintn bits[ITEM_ROWS][SIDE];
+    for (int row = 0; row < ITEM_ROWS; ++row)
+        for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(0u);
+    uint count = 0;
+
+    const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
+    const Search search = {bounds[tile], 0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
+    const int2 size = (int2)(occluders.width, occluders.height);
+    const int2 block_count = (size + (BLOCK - 1)) / BLOCK, super_count = (block_count + (BLOCK - 1)) / BLOCK;
+    const int4 supers = window(search, nearest, search.texel * (BLOCK * BLOCK), (int2)(0), super_count);
+    for (int side = 0; side < sides; ++side) {
+        __global const MicroPatch* const own_patches = side ? patches_1 : patches_0;
+        __global const float* const own_blocks = side ? blocks_1 : blocks_0;
+        __global const float* const own_supers = side ? superblocks_1 : superblocks_0;
+        Limits limits[ITEM_ROWS];
+        bool has_limits = false;
+        for (int s = supers.y * super_count.x; s < supers.w * super_count.x; ++s) {
+            const int2 super = (int2)(s % super_count.x, s / super_count.x);
+            if (super.x < supers.x || super.x >= supers.z) continue;
+            if (stopped(stop)) return;
+            const int2 low = super * BLOCK;
+            const int4 inside = window(search, own_supers[s], search.texel * BLOCK, low, min(low + BLOCK, block_count));
+            for (int by = inside.y; by < inside.w; ++by)
+                for (int bx = inside.x; bx < inside.z; ++bx) {
+                    const int2 first = (int2)(bx, by) * BLOCK;
+                    const int4 near = window(search, own_blocks[by * block_count.x + bx], search.texel, first, min(first + BLOCK, size));
+                    for (int j = near.y; j < near.w; ++j) {
+                        Candidate candidates[BLOCK];
+                        const int found = candidates_of_row(candidates, own_patches, size.x, search, j, near.x, near.z);
+                        count += found;
+                        const float b0 = 1.0f - (j + 1) * search.texel.y, b1 = 1.0f - j * search.texel.y;
+                        for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
+                            const int at = (y + row) * receivers.stride + x;
+                            const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
+                            if (!has_limits)
+                                limits[row] = limits_with_planes(occluders, bias, precision, has_planes, side ? texels_1 : texels_0, side ? steps_1 : steps_0,
+                                                                 has_planes ? load_lanes(slope_xi + at) : own_d, has_planes ? load_lanes(slope_eta + at) : own_d, own_xi,
+                                                                 own_eta, own_d);
+                            const floatn plane = fma((floatn)(0.5f * (b0 + b1)), limits[row].slope_eta, limits[row].level);
+                            for (int i = 0; i < found; ++i) hide(bits[row], candidates[i], b0, b1, scale, own_xi, own_eta, own_d, limits[row], plane);
+                        }
+                        has_limits |= found > 0;
+                    }
+                }
+        }
+    }
+
+    for (int row = 0; row < ITEM_ROWS && y + row < receivers.height; ++row) {
+        uintn hidden = (uintn)(0u);
+        for (int k = 0; k < SIDE; ++k) hidden += popcount(bits[row][k]);
+        write_visibility(visibility + (y + row) * receivers.width + x, 1.0f - convert_floatn(hidden) * (1.0f / (SIDE * SIDE)), receivers.width - x, 0);
+    }
+    if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[tile] = count;
+}
