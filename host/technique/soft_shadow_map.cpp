@@ -37,12 +37,18 @@ void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, Ma
                 superblocks);
 }
 
+// A union needs surfaces as they are: the mean of two is none of them.
+Reduction reduction_of(const SoftShadowMap& settings)
+{
+    return settings.visibility == PatchVisibility::united ? Reduction::nearest : settings.reduction;
+}
+
 PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
                                          MapSize size)
 {
     const MapSize blocks = blocks_of(size), superblocks = blocks_of(blocks);
     PreparedSoftShadowMap::Side side{
-        .map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program),
+        .map = occluder_map(work, depth, from, size, reduction_of(prepared.settings), prepared.precision, prepared.program),
         .patches = {},
         .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
         .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
@@ -151,9 +157,9 @@ TechniqueRow row(const SoftShadowMap&)
                  integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
                                 "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
                  choice_key<S>("reduction", &S::reduction, reduction_names,
-                               "how a larger map becomes `resolution`: by covered area, or by the texel at the centre"),
+                               "how a larger map becomes `resolution`, for sum: by covered area, or by the texel at the centre; union takes the texel at the centre"),
                  choice_key<S>("accumulator", &S::accumulator, accumulator_names,
-                               "how shares are summed; binary16 is the 2006 hardware's blending, for study"),
+                               "how shares are summed, for sum; binary16 is the 2006 hardware's blending, for study"),
                  real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
                              "self-shadow bound of receivers on the casters' own surface; 1 is the bound, 0 none"),
                  flag_key<S>("project", &S::project, "shade in the light's view, then sample that mask from the receivers' camera"),
@@ -168,6 +174,9 @@ TechniqueRow row(const SoftShadowMap&)
 
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
 {
+    if (settings.visibility == PatchVisibility::united && settings.accumulator != Accumulator::binary32)
+        throw Error::at(ErrorCode::invalid_input, "technique.accumulator", "is " + std::string(accumulator_names[static_cast<std::size_t>(settings.accumulator)]) + " and visibility union",
+                        "expected visibility sum: a union sums nothing up");
     const MapSize from{depth.width, depth.height};
     const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
     PreparedSoftShadowMap prepared{.settings = settings,

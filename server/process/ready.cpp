@@ -46,7 +46,7 @@ Scene known_scene()
 
 void check_known_mask(const Engine& engine)
 {
-    const Mask mask = engine.mask(known_scene(), SoftShadowMap{.sides = Sides::front});
+    const Mask mask = engine.mask(known_scene(), SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front});
     // The light's point u is hidden from x when the segment's middle, (u + x) / 2, has x < 0: the visible share is 1/2 + x / (2
     // half_light). The sum has at most side * side terms of a share of at most 1, each right to a few units of float32's last place (8 are
     // allowed for): 256 * 8 * 2^-24.
@@ -67,7 +67,7 @@ void warm(const Engine& engine)
     const Scene scene = known_scene();
     for (const Technique& technique : technique_choices()) engine.mask(scene, technique);
     // A reduced occluder map has a kernel of its own.
-    engine.mask(scene, SoftShadowMap{.resolution = side / 2});
+    engine.mask(scene, SoftShadowMap{.visibility = PatchVisibility::sum, .resolution = side / 2});
     engine.mask(scene, SoftShadowMap{.resolution = side / 2, .reduction = Reduction::nearest});
 }
 

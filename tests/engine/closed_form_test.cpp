@@ -135,7 +135,7 @@ TEST(ClosedForm, ExactValues)
 TEST(ClosedForm, EmptyMapLeavesEverythingLit)
 {
     for (const Accumulator accumulator : {Accumulator::binary32, Accumulator::compensated, Accumulator::binary16}) {
-        const Mask mask = Parallel{}.mask(SoftShadowMap{.sides = Sides::front, .accumulator = accumulator});
+        const Mask mask = Parallel{}.mask(SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front, .accumulator = accumulator});
         for (const float v : mask.visibility.pixels) EXPECT_EQ(v, 1.0f);
     }
 }

@@ -10,8 +10,9 @@ namespace {
 const std::vector<Technique> techniques = {
     SoftShadowMap{},
     SoftShadowMap{.sides = Sides::front, .resolution = 31},
-    SoftShadowMap{.accumulator = Accumulator::compensated},
-    SoftShadowMap{.accumulator = Accumulator::binary16},
+    SoftShadowMap{.visibility = PatchVisibility::sum},
+    SoftShadowMap{.visibility = PatchVisibility::sum, .accumulator = Accumulator::compensated},
+    SoftShadowMap{.visibility = PatchVisibility::sum, .accumulator = Accumulator::binary16},
     ShadowMap{},
     ShadowMap{.filter = ShadowFilter::percentage_closer, .taps = 4},
     ShadowMap{.filter = ShadowFilter::bicubic},

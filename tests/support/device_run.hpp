@@ -24,7 +24,7 @@ struct SoftCase {
     Vec2 tangent{1, 1};
     DepthMap front;
     std::optional<DepthMap> back;
-    SoftShadowMap settings;
+    SoftShadowMap settings{.visibility = PatchVisibility::sum};
     DepthMap receivers;
     std::optional<Camera> camera; // of the receivers; nothing: the light's view
 };

@@ -103,7 +103,7 @@ SoftCase plane_of_patches(int n, Accumulator accumulator)
 {
     SoftCase c{.front = flat(n, n, 4),
                .back = {},
-               .settings = {.sides = Sides::front, .accumulator = accumulator},
+               .settings = {.visibility = PatchVisibility::sum, .sides = Sides::front, .accumulator = accumulator},
                .receivers = flat(1, 1, 8),
                .camera = {}};
     c.half_u = c.half_v = 4;
@@ -162,7 +162,7 @@ TEST(Accumulator, CompensatedIsCloserThanBinary32)
     for (const Accumulator accumulator : {Accumulator::binary32, Accumulator::compensated}) {
         SoftCase c{.front = random_map(151, 149, 3, 3.2, 0.1, 3),
                    .back = {},
-                   .settings = {.sides = Sides::front, .accumulator = accumulator},
+                   .settings = {.visibility = PatchVisibility::sum, .sides = Sides::front, .accumulator = accumulator},
                    .receivers = flat(8, 8, 12),
                    .camera = {}};
         c.half_u = c.half_v = 3.9;

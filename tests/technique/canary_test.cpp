@@ -27,7 +27,7 @@ TEST(Canary, SoftShadowMap)
             for (const int resolution : {0, 5}) {
                 SoftCase c{.front = random_map(occluders.width, occluders.height, 1, 4, 0.3, 1),
                            .back = random_map(occluders.width, occluders.height, 2, 5, 0.3, 2),
-                           .settings = {.sides = Sides::both, .resolution = resolution},
+                           .settings = {.visibility = PatchVisibility::sum, .sides = Sides::both, .resolution = resolution},
                            .receivers = random_map(receivers.width, receivers.height, 3, 9, 0.1, 3),
                            .camera = {}};
                 SoftRun r;
@@ -43,7 +43,7 @@ TEST(Canary, EveryAccumulatorAndReduction)
         for (const Reduction reduction : {Reduction::area, Reduction::nearest}) {
             SoftCase c{.front = random_map(61, 93, 1, 4, 0.3, 1),
                        .back = {},
-                       .settings = {.sides = Sides::front, .resolution = 31, .reduction = reduction, .accumulator = accumulator},
+                       .settings = {.visibility = PatchVisibility::sum, .sides = Sides::front, .resolution = 31, .reduction = reduction, .accumulator = accumulator},
                        .receivers = random_map(33, 15, 3, 9, 0.1, 3),
                        .camera = {}};
             SoftRun r;

@@ -16,7 +16,7 @@ TEST_P(Lanes, GiveTheSameBits)
 {
     const SoftCase c{.front = random_map(93, 61, 2, 4, 0.3, 7),
                      .back = random_map(93, 61, 3, 5, 0.3, 8),
-                     .settings = {.accumulator = GetParam()},
+                     .settings = {.visibility = PatchVisibility::sum, .accumulator = GetParam()},
                      .receivers = random_map(61, 47, 4, 9, 0.1, 9),
                      .camera = {}};
 

@@ -46,7 +46,7 @@ SoftCase random_case(Size occluders, Size receivers, Sides sides, std::uint32_t 
 {
     SoftCase c{.front = random_map(occluders.width, occluders.height, 2, 4, 0.2, seed),
                .back = {},
-               .settings = {.sides = sides},
+               .settings = {.visibility = PatchVisibility::sum, .sides = sides},
                .receivers = random_map(receivers.width, receivers.height, 5, 9, 0.1, seed + 1),
                .camera = {}};
     c.back = random_map(occluders.width, occluders.height, 3, 5, 0.3, seed + 2);
@@ -137,7 +137,7 @@ TEST(SoftShadowMapOracle, CullingLeavesOutPairsThatAddNothing)
 // The bound is worth something: an oracle of a map with one texel missing is noticed.
 TEST(SoftShadowMapOracle, BoundIsSharpEnoughToMissATexel)
 {
-    SoftCase c{.front = flat(16, 16, 2), .back = {}, .settings = {.sides = Sides::front}, .receivers = flat(1, 1, 8), .camera = {}};
+    SoftCase c{.front = flat(16, 16, 2), .back = {}, .settings = {.visibility = PatchVisibility::sum, .sides = Sides::front}, .receivers = flat(1, 1, 8), .camera = {}};
     c.half_u = c.half_v = 1;
     SoftRun r = run(device_context(), c);
     r.maps[0].texels[8 * 16 + 8].disparity = 0;

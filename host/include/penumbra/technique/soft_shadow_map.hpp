@@ -13,11 +13,11 @@ enum class PatchVisibility { sum, united };
 struct SoftShadowMap {
     // united (`union` in scene files): which of 32 x 32 samples of the light the patches of all maps hide, each once. sum: the paper's, the shares
     // added up, and of two maps the larger.
-    PatchVisibility visibility = PatchVisibility::sum;
+    PatchVisibility visibility = PatchVisibility::united;
     Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
     int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
-    Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`
-    Accumulator accumulator = Accumulator::binary32; // binary16: the blending of Appendix A, for study
+    Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`, of sum; united takes the nearest texel
+    Accumulator accumulator = Accumulator::binary32; // of sum; binary16: the blending of Appendix A, for study
     double bias = 1.0;                               // in units of the bound derived from each texel's slope and the depth's precision
     bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
     int project_resolution = 512;                    // of that mask
