@@ -459,11 +459,11 @@ TEST(SlicesOfMaps, TheSolidBetweenFrontAndBackCasts)
     const auto scene = [](const Light& light, const LightCamera& view, float near, float far, const Receivers& r) {
         Occluders o = occluders(view, boxes(64, 64, near, {{16, 48, 16, 48}}));
         o.layers = {boxes(64, 64, far, {{16, 48, 16, 48}})};
-        const OcclusionTexture settings{.slices = 8, .combine = Combine::product}; // layered_max takes the greater of two sides for the union of both
-        const Image shells = map_mask(light, o, r, settings);
+        const OcclusionTexture product{.slices = 8, .combine = Combine::product}; // layered_max takes the greater of two sides for the union of both
+        const Image shells = map_mask(light, o, r, product);
         o.back = o.layers[0];
         o.layers.clear();
-        return std::pair{shells, map_mask(light, o, r, settings)};
+        return std::pair{shells, map_mask(light, o, r, product)};
     };
     // A receiver off to the side, whose lines to a wide light cross the solid's flank.
     const Receivers side =
