@@ -91,6 +91,12 @@ void filter_row(const Engine& engine, const Scene& scene, const OcclusionTexture
     std::fflush(stdout);
 }
 
+// As the paper has it.
+constexpr OcclusionTexture paper_settings{.projection_centre = ProjectionCentre::behind_light,
+                                          .prefilter = Prefilter::nbuffer,
+                                          .combine = Combine::product,
+                                          .self_shadow = SelfShadow::fade};
+
 // Processor time of one shading, of all cores together: what others do on the machine hardly moves it. The least of five batches.
 double shade_cpu_ms(const Engine& engine, const Scene& scene, const OcclusionTexture& settings)
 {
@@ -113,7 +119,7 @@ void cpu_header(const char* parameter)
 
 void cpu_row(const Engine& engine, const Scene& scene, const char* parameter)
 {
-    std::printf("# | %s | %.1f | %.1f |\n", parameter, shade_cpu_ms(engine, scene, {}),
+    std::printf("# | %s | %.1f | %.1f |\n", parameter, shade_cpu_ms(engine, scene, {.prefilter = Prefilter::nbuffer}),
                 shade_cpu_ms(engine, scene, {.prefilter = Prefilter::summed_area}));
     std::fflush(stdout);
 }
@@ -132,8 +138,9 @@ void occlusion(const Engine& engine)
     for (const int slices : {4, 16}) row({.slices = slices, .resolution = 512}, slices);
     row({.slices = 64}, 64);
     for (const Placement placement : {Placement::reciprocal, Placement::occupied}) row({.placement = placement}, 16);
-    row({.leak_fix = true}, 16);
-    for (const SelfShadow self : {SelfShadow::own, SelfShadow::omit}) row({.self_shadow = self}, 16);
+    row({.combine = Combine::product, .leak_fix = true}, 16);
+    for (const SelfShadow self : {SelfShadow::fade, SelfShadow::own, SelfShadow::omit}) row({.self_shadow = self}, 16);
+    row(paper_settings, 16);
     for (const Combine combine : {Combine::product, Combine::layered, Combine::layered_max})
         for (const int splits : {2, 4}) row({.combine = combine, .light_splits = splits}, splits);
     emit(engine, scene, SoftShadowMap{}, reference, "occlusion", 128, 9);
@@ -169,7 +176,7 @@ void occlusion_light(const Engine& engine)
     for (const double side : {0.1, 0.2, 0.5, 1.0, 2.0}) {
         const Scene scene = paper_scene(Occluder::bunny, {.light_side = side});
         const Image reference = reference_of(engine, scene, reference_samples);
-        for (const Combine combine : {Combine::product, Combine::layered})
+        for (const Combine combine : {Combine::product, Combine::layered_max})
             emit(engine, scene, OcclusionTexture{.combine = combine}, reference, "occlusion_light", side, 9);
         emit(engine, scene, SoftShadowMap{}, reference, "occlusion_light", side, 9);
         emit(engine, scene, rays(64, true), reference, "occlusion_light", side, 3);
@@ -180,7 +187,7 @@ void occlusion_light(const Engine& engine)
         scene.receivers.camera = scene.occluders.camera =
             LightCamera{.tan_half_fov = {}, .half_extent = Vec2(3, 3), .center = Vec3(0, 8, 0)};
         const Image reference = reference_of(engine, scene, reference_samples);
-        for (const Combine combine : {Combine::product, Combine::layered})
+        for (const Combine combine : {Combine::product, Combine::layered_max})
             emit(engine, scene, OcclusionTexture{.combine = combine}, reference, "occlusion_sun", degrees, 9);
         emit(engine, scene, rays(64, true), reference, "occlusion_sun", degrees, 3);
     }
@@ -206,7 +213,7 @@ void occlusion_casters(const Engine& engine)
         const double triangles = static_cast<double>(scene.objects.front().mesh.triangles.size());
         for (const int slices : {4, 16})
             emit(engine, scene, OcclusionTexture{.slices = slices}, reference, "occlusion_bunnies", triangles, 9);
-        emit(engine, scene, OcclusionTexture{.combine = Combine::layered}, reference, "occlusion_bunnies", triangles, 9);
+        emit(engine, scene, paper_settings, reference, "occlusion_bunnies", triangles, 9);
         emit(engine, scene, SoftShadowMap{}, reference, "occlusion_bunnies", triangles, 9);
         emit(engine, scene, SoftShadowVolume{}, reference, "occlusion_bunnies", triangles, 5);
         emit(engine, scene, rays(64, true), reference, "occlusion_bunnies", triangles, 3);
@@ -225,7 +232,8 @@ void occlusion_sheet(const Engine& engine)
     for (const Combine combine : {Combine::product, Combine::sum, Combine::max, Combine::layered, Combine::layered_max})
         for (const int slices : {4, 16, 64}) row(tilted, {.slices = slices, .combine = combine}, tilted_reference);
     for (const Combine combine : {Combine::product, Combine::layered})
-        row(tilted, {.prefilter = Prefilter::summed_area, .combine = combine}, tilted_reference);
+        row(tilted, {.prefilter = Prefilter::nbuffer, .combine = combine}, tilted_reference);
+    row(tilted, paper_settings, tilted_reference);
 }
 
 } // namespace penumbra::bench

@@ -65,13 +65,46 @@ std::string devices_json(const std::vector<DeviceInfo>& devices, int selected)
     return text_of({{"version", version()}, {"devices", list}});
 }
 
+namespace {
+
+bool go_together(const Technique& technique)
+{
+    try {
+        check_together_of(technique);
+        return true;
+    } catch (const Error&) {
+        return false;
+    }
+}
+
+// The technique, with another value of one more of its keys where it has to have one.
+Technique with_what_goes_along(const TechniqueRow& row, const SettingKey& chosen, const Technique& technique)
+{
+    if (go_together(technique)) return technique;
+    for (const SettingKey& key : row.keys) {
+        if (key.name == chosen.name) continue;
+        for (const SettingValue& value : other_values(key, row.defaults)) {
+            Technique changed = technique;
+            key.set(changed, value);
+            if (go_together(changed)) return changed;
+        }
+    }
+    throw Error(ErrorCode::internal, std::string(row.kind) + "." + std::string(chosen.name) + " goes together with nothing");
+}
+
+} // namespace
+
 std::vector<Technique> technique_choices()
 {
     std::vector<Technique> all;
     for (const TechniqueRow& row : technique_table()) {
         all.push_back(row.defaults);
         for (const SettingKey& key : row.keys)
-            for (const SettingValue& value : other_values(key, row.defaults)) key.set(all.emplace_back(row.defaults), value);
+            for (const SettingValue& value : other_values(key, row.defaults)) {
+                Technique technique = row.defaults;
+                key.set(technique, value);
+                all.push_back(with_what_goes_along(row, key, technique));
+            }
     }
     return all;
 }

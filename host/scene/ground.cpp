@@ -121,6 +121,9 @@ bool shows_behind(const Ground& ground, const LightFrame& light, const DepthMap&
 {
     const auto point_at = [&](double x, double y, double z) { return world_point(camera, depth.width, depth.height, x, y, z); };
     const auto behind_at = [&](double x, double y, double z) { return ground.offset - ground.normal.dot(point_at(x, y, z)); };
+    // How far behind a point of the ground itself may seem to lie: the rounding of binary32 and of its renderer, or the noise that images have or say
+    // that they have. What lies further behind receives: were the ground left out, its shadow would be lost there.
+    const auto margin = static_cast<float>(depth.from_image ? 4e-3 + 4 * std::max(depth.noise, depth.precision) : 1e-4);
     std::size_t there = 0, behind = 0;
     for (int y = 0; y < depth.height; ++y) {
         const double row = y + .5, at_camera = behind_at(.5, row, 0), at_one = behind_at(.5, row, 1);
@@ -132,7 +135,7 @@ bool shows_behind(const Ground& ground, const LightFrame& light, const DepthMap&
             if (!(z[x] > 0 && z[x] < std::numeric_limits<float>::infinity())) continue;
             ++there;
             const auto column = static_cast<float>(x);
-            if (constant + across * column + z[x] * (slope + spread * column) > .03f * z[x]) behind += casts_on(ground, light, point_at(x + .5, row, z[x]));
+            if (constant + across * column + z[x] * (slope + spread * column) > margin * z[x]) behind += casts_on(ground, light, point_at(x + .5, row, z[x]));
         }
     }
     return depth.from_image ? behind * 500 > there : behind > 0;

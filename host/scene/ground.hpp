@@ -24,9 +24,9 @@ std::vector<Ground> grounds_of(const LightFrame& light, const std::vector<Object
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle);
 bool in_ground(const std::vector<Ground>& grounds, const TriangleMesh& mesh);
 
-// Whether a depth image shows something on the far side of a ground that it casts on: more than 2 in 1000 of its points, or of exact depth any, lie
-// behind by 3 % of their depth, and on the way from there to the light is the ground's box, widened by the light. Nearer than that they may be the
-// ground itself, as a noisy image shows it.
+// Whether a depth image shows something on the far side of a ground that it casts on: more than 2 in 1000 of its points lie behind by .4 % of their
+// depth and four times the noise that the image says it has, or of exact depth any by .01 %, and on the way from there to the light is the ground's box,
+// widened by the light. Nearer than that they may be the ground itself.
 bool shows_behind(const std::vector<Ground>& grounds, const LightFrame& light, const DepthMap& depth, const Camera& camera);
 
 } // namespace penumbra

@@ -40,16 +40,15 @@ opencl::Specialisation program(int lanes, LevelKind kind, const OcclusionTexture
                              element_size(kind, settings) == 2 ? LevelStorage::normalized16 : LevelStorage::binary32)}};
 }
 
-void check_settings(const LightFrame& light, const OcclusionTexture& settings)
+[[noreturn]] void refuse(const std::string& key, const std::string& what, const std::string& expected)
 {
-    const auto refuse = [](const std::string& key, const std::string& what, const std::string& expected) {
-        throw Error::at(ErrorCode::invalid_input, "technique." + key, what, expected);
-    };
+    throw Error::at(ErrorCode::invalid_input, "technique." + key, what, expected);
+}
+
+void check_light(const LightFrame& light, const OcclusionTexture& settings)
+{
     if (settings.light_splits > 1 && light.shape == LightShape::disc)
-        refuse("light_splits", "is " + std::to_string(settings.light_splits) + " and the light a disc",
-               "expected 1: only rectangles are split");
-    if (settings.leak_fix && (settings.combine != Combine::product && settings.combine != Combine::max))
-        refuse("leak_fix", "is true and combine adds slices up", "expected combine product or max: a sum would count each surface twice");
+        refuse("light_splits", "is " + std::to_string(settings.light_splits) + " and the light a disc", "expected 1: only rectangles are split");
     if (settings.placement == Placement::reciprocal && light.directional)
         refuse("placement", "is reciprocal and the light directional", "expected uniform or occupied: such a light has no nearest depth");
 }
@@ -130,12 +129,19 @@ TechniqueRow row(const OcclusionTexture&)
             .defaults = OcclusionTexture{}};
 }
 
+void check_together(const OcclusionTexture& settings)
+{
+    if (settings.leak_fix && settings.combine != Combine::product && settings.combine != Combine::max)
+        refuse("leak_fix", "is true and combine adds slices up", "expected combine product or max: a sum would count each surface twice");
+}
+
 PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Light& light, std::span<const TriangleMesh* const> meshes,
                                                    const SolidMaps* solid, const OcclusionTexture& settings, bool receivers_cast)
 {
     work.stage("casters");
     LightFrame frame = light_frame(light);
-    check_settings(frame, settings);
+    check_together(settings);
+    check_light(frame, settings);
     const LevelKind kind = level_kind(frame.directional, settings);
     if (frame.shape == LightShape::disc && kind != LevelKind::smooth) {
         frame.half_u *= square_of_disc;

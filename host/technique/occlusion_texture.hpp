@@ -44,5 +44,6 @@ void shade(opencl::Work& work, const PreparedOcclusionTexture& prepared, const R
 std::vector<WorkAmount> work(const OcclusionTexture& settings, const MaskShape& shape);
 std::vector<opencl::Specialisation> specialisations(const OcclusionTexture& settings, int lanes);
 DeviceBuffers device_buffers(const OcclusionTexture& settings);
+void check_together(const OcclusionTexture& settings);
 
 } // namespace penumbra

@@ -60,6 +60,16 @@ inline Needs needs_of(const Technique& technique)
     return std::visit([](const auto& settings) { return needs(settings); }, technique);
 }
 
+// Throws invalid_input for keys that exclude each other.
+inline void check_together_of(const Technique& technique)
+{
+    std::visit(
+        [](const auto& settings) {
+            if constexpr (requires { check_together(settings); }) check_together(settings);
+        },
+        technique);
+}
+
 inline DeviceBuffers device_buffers_of(const Technique& technique)
 {
     return std::visit([](const auto& settings) { return device_buffers(settings); }, technique);

@@ -15,6 +15,10 @@
 //
 //   PreparedS with_emission(opencl::Work&, const PreparedS&, const Light&)  the same light under another emission
 //
+// And one for those that have keys which exclude each other:
+//
+//   void check_together(const S&)                                           throws invalid_input, whatever the light is
+//
 // techniques.hpp checks that each has them all.
 #pragma once
 
