@@ -155,6 +155,7 @@ void add_places(const Object& object, const std::string& prefix, std::vector<std
         for (const Key& key : form.keys) {
             const std::string at = prefix + std::string(key.name);
             if (std::holds_alternative<File>(key.type)) add(at);
+            if (std::holds_alternative<FileTable>(key.type)) add(at + "{}");
             if (const auto* files = std::get_if<Files>(&key.type)) {
                 if (files->or_one) add(at);
                 add(at + "[]");
