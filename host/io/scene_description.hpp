@@ -94,6 +94,9 @@ struct Object {
 // The key whose value decides an object's form.
 Key kind(std::string_view name);
 
+// An object of one form, `exactly_one` being the form's.
+Object of_one_form(std::string_view name, std::string_view meaning, std::vector<Key> keys, std::vector<std::string_view> exactly_one = {});
+
 const Object& scene();
 const Object& light();        // forms in the order of the variant Light
 const Object& listed_light(); // of `lights`: the same with keys of its own
