@@ -38,10 +38,13 @@ bool write_file(const char* path, const std::string& text)
 }
 
 constexpr std::uint64_t reads = LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+// REFER: moving a file to another folder, which PoCL does with each library that it has linked. Where it is not handled it is refused.
 constexpr std::uint64_t writes = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
                                  LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG | LANDLOCK_ACCESS_FS_MAKE_SYM |
                                  LANDLOCK_ACCESS_FS_MAKE_FIFO | LANDLOCK_ACCESS_FS_MAKE_SOCK | LANDLOCK_ACCESS_FS_MAKE_CHAR |
-                                 LANDLOCK_ACCESS_FS_MAKE_BLOCK;
+                                 LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_REFER;
+constexpr std::uint64_t truncate = std::uint64_t{1} << 14; // LANDLOCK_ACCESS_FS_TRUNCATE, of kernels newer than Debian 12's headers
+constexpr long version_of_refer = 2, version_of_truncate = 3;
 
 // A folder that is not there needs no rule.
 void open_folder(int rules, const std::string& folder, std::uint64_t access)
@@ -127,13 +130,16 @@ OpenFolders folders_of_a_worker(const std::string& temporary)
 
 bool close_files(const OpenFolders& folders)
 {
-    const landlock_ruleset_attr handled{.handled_access_fs = reads | writes};
+    const long version = syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
+    if (version < version_of_refer) return false;
+    const std::uint64_t all = reads | writes | (version >= version_of_truncate ? truncate : 0);
+    const landlock_ruleset_attr handled{.handled_access_fs = all};
     const Descriptor rules(static_cast<int>(syscall(SYS_landlock_create_ruleset, &handled, sizeof(handled), 0)));
     if (!rules) return false;
     for (const std::string& folder : folders.read) open_folder(rules.get(), folder, reads);
-    for (const std::string& folder : folders.write) open_folder(rules.get(), folder, reads | writes);
+    for (const std::string& folder : folders.write) open_folder(rules.get(), folder, all);
     open_folder(rules.get(), "/dev", reads | LANDLOCK_ACCESS_FS_WRITE_FILE);
-    open_folder(rules.get(), "/dev/shm", reads | writes);
+    open_folder(rules.get(), "/dev/shm", all);
     return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && syscall(SYS_landlock_restrict_self, rules.get(), 0) == 0;
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -48,13 +49,31 @@ bool can_open(const fs::path& path, int flags)
 
 TEST_F(Confinement, FilesElsewhereAreClosed)
 {
-    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 0) GTEST_SKIP() << "this kernel has no Landlock";
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 2) GTEST_SKIP() << "this kernel has no Landlock";
     EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "secret", O_RDONLY));
     EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "new", O_WRONLY | O_CREAT));
     EXPECT_IN_CHILD(closed() && !can_open("/etc/passwd", O_RDONLY));
     EXPECT_IN_CHILD(closed() && can_open(folder / "open" / "new", O_RDWR | O_CREAT));
     EXPECT_IN_CHILD(closed() && can_open("/usr/bin/env", O_RDONLY) && !can_open("/usr/new", O_WRONLY | O_CREAT));
     EXPECT_IN_CHILD(closed() && can_open("/dev/null", O_WRONLY));
+}
+
+// As PoCL does with what it has linked.
+TEST_F(Confinement, FilesMoveWithinWhatIsOpen)
+{
+    fs::create_directories(folder / "open" / "kernels");
+    std::ofstream(folder / "open" / "new") << "library";
+    EXPECT_IN_CHILD((closed(), std::rename((folder / "open" / "new").c_str(), (folder / "open" / "kernels" / "library").c_str()) == 0));
+    std::ofstream(folder / "open" / "mine") << "text";
+    EXPECT_IN_CHILD((closed(), std::rename((folder / "open" / "mine").c_str(), (folder / "open" / "yours").c_str()) == 0));
+}
+
+TEST_F(Confinement, FilesElsewhereKeepTheirLength)
+{
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 3) GTEST_SKIP() << "this kernel's Landlock does not know truncation";
+    EXPECT_IN_CHILD(closed() && ::truncate((folder / "shut" / "secret").c_str(), 0) != 0 && errno == EACCES);
+    std::ofstream(folder / "open" / "mine") << "text";
+    EXPECT_IN_CHILD(closed() && ::truncate((folder / "open" / "mine").c_str(), 0) == 0);
 }
 
 TEST_F(Confinement, SocketsAndTracingAreRefused)
