@@ -127,6 +127,7 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
         throw;
     }
     if (!call.id.empty()) worker.keeps(call.id);
+    if (crashes_.any()) crashes_.absolve(digest());
     CallReply answer = reply_from(message.text);
     if (!answer.problem) return answer;
     Connection::current().inside = answer.inside;
