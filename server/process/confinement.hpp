@@ -22,8 +22,8 @@ OpenFolders folders_of_a_worker(const std::string& temporary);
 // that lets files be moved within them (Linux 5.19).
 bool close_files(const OpenFolders& folders);
 
-// Refuses sockets but those of this machine's processes, tracing others, mounting and loading modules (seccomp), for this process and
-// those that it starts. False: the kernel has no filters.
+// Refuses sockets but those of this machine's processes, signals to others, tracing them, mounting and loading modules (seccomp), for this
+// process and those that it starts. False: the kernel has no filters.
 bool close_calls();
 
 // Memory beyond what the process has now, in bytes: what is private and can be written (RLIMIT_DATA). Throws Error device where it cannot be set.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 #include <fcntl.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -83,6 +85,27 @@ TEST_F(Confinement, SocketsAndTracingAreRefused)
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_NETLINK, SOCK_RAW, 0) < 0 && errno == EPERM);
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0);
     EXPECT_IN_CHILD(server::close_calls() && ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) < 0 && errno == EPERM);
+}
+
+TEST_F(Confinement, OtherProcessesAreOutOfReach)
+{
+    const pid_t parent = getpid();
+    EXPECT_IN_CHILD(server::close_calls() && kill(parent, 0) < 0 && errno == EPERM && kill(getpid(), 0) == 0);
+    EXPECT_IN_CHILD(server::close_calls() && syscall(SYS_tgkill, parent, parent, 0) < 0 && errno == EPERM);
+    rlimit limit{};
+    EXPECT_IN_CHILD(server::close_calls() && prlimit(parent, RLIMIT_NOFILE, nullptr, &limit) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && getrlimit(RLIMIT_NOFILE, &limit) == 0);
+    EXPECT_IN_CHILD(server::close_calls() && setpriority(PRIO_PROCESS, static_cast<id_t>(parent), 19) < 0 && errno == EPERM);
+    EXPECT_EXIT((server::close_calls(), std::abort()), testing::KilledBySignal(SIGABRT), "");
+}
+
+TEST_F(Confinement, NoWayAroundTheFilter)
+{
+    EXPECT_IN_CHILD(server::close_calls() && syscall(SYS_io_uring_setup, 1, nullptr) < 0 && errno == EPERM);
+#if defined(__x86_64__)
+    constexpr long x32 = 0x40000000;
+    EXPECT_IN_CHILD(server::close_calls() && syscall(x32 | SYS_socket, AF_INET, SOCK_STREAM, 0) < 0 && errno == EPERM);
+#endif
 }
 
 TEST_F(Confinement, MemoryIsLimited)
