@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "depth_image/edges.hpp"
+#include "scene/memory.hpp"
 #include "scene/parallel.hpp"
 #include "scene/stop.hpp"
 
@@ -213,6 +215,8 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     fit.pixel_x = 2 * camera.half_extent.x / depth.width;
     fit.pixel_y = 2 * camera.half_extent.y / depth.height;
     const std::size_t count = depth.depth.size();
+    // Its images, their copies on the device, and what is made of them after: 224 bytes a pixel were the most.
+    require_memory(230. * static_cast<double>(count), "fitting a depth image of " + std::to_string(depth.width) + " x " + std::to_string(depth.height));
 
     // Values and where there is something.
     fit.there.assign(count, 0);

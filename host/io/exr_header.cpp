@@ -17,6 +17,9 @@ constexpr std::uint64_t bytes_per_chunk = 8, rows_per_chunk = 256;
 // More pixels a byte than any of the compressions reach (deflate 1032, and less than 64 times that with the run lengths of DWA before it).
 constexpr std::uint64_t pixels_per_byte = 65536;
 
+// Of a part. Renderers write some tens.
+constexpr std::size_t most_channels = 1024;
+
 std::uint32_t little_endian(std::span<const std::byte> bytes)
 {
     std::uint32_t value = 0;
@@ -139,11 +142,25 @@ private:
         if (!has_its_size(type, value))
             throw broken("its EXR header has a value of " + std::to_string(value.size()) + " bytes, which is not what its type has");
         if (attribute == "dataWindow" && type == "box2i" && value.size() == 16) check_window(value);
+        if (type == "chlist") check_channels(value);
         if (attribute == "tiles" && type == "tiledesc" && value.size() == 9)
             check_area(little_endian(value), little_endian(value.subspan(4)), "tiles");
         if (attribute == "chunkCount" && type == "int" && value.size() == 4 && little_endian(value) > file_size_ / bytes_per_chunk)
             throw broken("its EXR header claims " + std::to_string(little_endian(value)) + " chunks");
         return true;
+    }
+
+    // Readers take time that grows with their number's square, and texts that list them as long as the header.
+    void check_channels(std::span<const std::byte> value)
+    {
+        constexpr std::size_t after_name = 16;
+        for (std::size_t count = 0;; ++count) {
+            const std::optional<std::string_view> name = take_name(value);
+            if (!name || name->empty()) return; // its end, or broken in a way that readers tell
+            if (count == most_channels)
+                throw Error(ErrorCode::too_large, std::string(where_) + " has more than " + std::to_string(most_channels) + " channels");
+            value = value.subspan(std::min(after_name, value.size()));
+        }
     }
 
     void check_window(std::span<const std::byte> value)

@@ -131,6 +131,9 @@ private:
 
 json parse_json(std::string_view text)
 {
+    // To the parser it is the end, and what stands behind it nothing.
+    if (const std::size_t at = text.find('\0'); at != std::string_view::npos)
+        throw Error(ErrorCode::invalid_input, "is not JSON: byte " + std::to_string(at + 1) + " is 0");
     DocumentMaker maker;
     json::sax_parse(text, &maker);
     return maker.take();

@@ -1,4 +1,5 @@
 #include "io/pfm.hpp"
+#include "scene/memory.hpp"
 
 #include <bit>
 #include <charconv>
@@ -65,6 +66,7 @@ Image decode_pfm(std::span<const std::byte> bytes, std::string_view where, std::
     if (rest.size() < expected)
         throw fail("is truncated: " + std::to_string(rest.size()) + " bytes of samples, expected " + std::to_string(expected));
 
+    require_memory(static_cast<double>(expected), where);
     // Rows stand bottom up.
     image.pixels.resize(row * static_cast<std::size_t>(image.height));
     for (std::size_t y = 0; y < static_cast<std::size_t>(image.height); ++y)

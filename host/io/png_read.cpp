@@ -8,6 +8,7 @@
 
 #include "io/image_format.hpp"
 #include "io/png.hpp"
+#include "scene/memory.hpp"
 
 namespace penumbra {
 
@@ -72,6 +73,8 @@ private:
         if (pixels / 8 / most_inflated > png_.size()) // one bit a pixel is the least
             throw Error(ErrorCode::invalid_input, std::string(where_) + " is truncated or broken: " + std::to_string(png_.size()) +
                                                       " bytes cannot hold " + size + " pixels");
+        // Samples as they are stored, as float, and one of two copies of those where channels are picked.
+        require_memory(static_cast<double>(pixels) * channels * 10, where_);
     }
 
     // What follows the pixels. Of the last chunk libspng reads no more than its name.

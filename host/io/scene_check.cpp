@@ -52,6 +52,10 @@ struct Check {
                               "expected " + std::to_string(files.low) + " to " + std::to_string(files.high));
         for (const JsonValue& element : elements) element.text();
     }
+    void operator()(const FileTable&) const
+    {
+        for (const auto& [name, file] : JsonObject(value).members()) file.text();
+    }
     void operator()(const Numbers& numbers) const
     {
         for (const double number : value.numbers(numbers.count))
@@ -92,7 +96,9 @@ bool named_at(const nlohmann::json& value, std::string_view place, std::span<con
     if (place.starts_with("[]"))
         return value.is_array() &&
                std::ranges::any_of(value, [&](const nlohmann::json& element) { return named_at(element, place.substr(2), names); });
-    const std::size_t end = std::min(place.find_first_of(".["), place.size());
+    if (place == "{}")
+        return value.is_object() && std::ranges::any_of(value, [&](const nlohmann::json& member) { return named_at(member, {}, names); });
+    const std::size_t end = std::min(place.find_first_of(".[{"), place.size());
     const auto member = value.is_object() ? value.find(place.substr(0, end)) : value.end();
     return member != value.end() && named_at(*member, place.substr(end), names);
 }
@@ -135,7 +141,7 @@ bool names_file(const nlohmann::json& value, std::string_view at, std::span<cons
     return std::ranges::any_of(file_places(), [&](std::string_view place) {
         if (!place.starts_with(at)) return false;
         place.remove_prefix(at.size());
-        return (place.empty() || place.starts_with('.') || place.starts_with('[')) && named_at(value, place, names);
+        return (place.empty() || std::string_view(".[{").find(place.front()) != std::string_view::npos) && named_at(value, place, names);
     });
 }
 

@@ -155,16 +155,11 @@ const Object& listed_light()
 const Object& quad()
 {
     constexpr std::string_view edge = "half-edge; not parallel to the other";
-    static const Object object{
-        "quad",
-        "A parallelogram; its front faces where cross(half_u, half_v) points.",
-        {{.name = "quad",
-          .of = {},
-          .meaning = {},
-          .keys = {
-              {.name = "center", .type = Numbers{3}, .meaning = "the middle", .unit = "length", .required = true, .example = "[0, 0, 0]"},
-              {.name = "half_u", .type = Numbers{3}, .meaning = edge, .unit = "length", .required = true, .example = "[4, 0, 0]"},
-              {.name = "half_v", .type = Numbers{3}, .meaning = edge, .unit = "length", .required = true, .example = "[0, 0, -4]"}}}}};
+    static const Object object = of_one_form(
+        "quad", "A parallelogram; its front faces where cross(half_u, half_v) points.",
+        {{.name = "center", .type = Numbers{3}, .meaning = "the middle", .unit = "length", .required = true, .example = "[0, 0, 0]"},
+         {.name = "half_u", .type = Numbers{3}, .meaning = edge, .unit = "length", .required = true, .example = "[4, 0, 0]"},
+         {.name = "half_v", .type = Numbers{3}, .meaning = edge, .unit = "length", .required = true, .example = "[0, 0, -4]"}});
     return object;
 }
 
@@ -181,6 +176,11 @@ const Object& object()
                            .meaning = "OBJ, PLY, STL, 3DS, glTF 2 (`.gltf`, `.glb`), decided by the extension",
                            .required = true,
                            .example = "\"bunny.obj\""},
+                          {.name = "files",
+                           .type = FileTable{},
+                           .meaning = "where the files lie that the mesh names (`.bin`, `.mtl`, images), by its names for them",
+                           .otherwise = "beside the mesh",
+                           .example = R"({"my mesh.bin": "my_mesh.bin"})"},
                           {.name = "weld",
                            .type = Number{.low = 0},
                            .meaning = "vertices no further apart are joined, as loose triangles want it whose corners were rounded; 0: those at equal places",
@@ -230,70 +230,62 @@ const Object& object()
 
 const Object& output()
 {
-    static const Object object{
-        "output",
-        "The mask's format, where a file name does not decide it.",
-        {{.name = "output",
-          .of = {},
-          .meaning = {},
-          .keys = {{.name = "format",
-                    .type = Text{"^([Ee][Xx][Rr]|[Tt][Ii][Ff][Ff]?|[Pp][Nn][Gg]|[Pp][Ff][Mm]|[Hh][Dd][Rr])$"},
-                    .meaning = "`exr`, `tif`, `png`, `pfm` or `hdr`. `penumbra mask -o` goes by the file name; `penumbra batch` by this",
-                    .required = true,
-                    .example = "\"tif\""},
-                   {.name = "bits",
-                    .type = OneOfIntegers{{8, 16, 32}},
-                    .meaning = "a sample's; exr 16 or 32, tif 8, 16 or 32, png 8 or 16, pfm and hdr 32",
-                    .otherwise = "exr, tif, pfm and hdr 32, png 16",
-                    .example = "32"}}}}};
+    static const Object object =
+        of_one_form("output", "The mask's format, where a file name does not decide it.",
+                    {{.name = "format",
+                      .type = Text{"^([Ee][Xx][Rr]|[Tt][Ii][Ff][Ff]?|[Pp][Nn][Gg]|[Pp][Ff][Mm]|[Hh][Dd][Rr])$"},
+                      .meaning = "`exr`, `tif`, `png`, `pfm` or `hdr`. `penumbra mask -o` goes by the file name; `penumbra batch` by this",
+                      .required = true,
+                      .example = "\"tif\""},
+                     {.name = "bits",
+                      .type = OneOfIntegers{{8, 16, 32}},
+                      .meaning = "a sample's; exr 16 or 32, tif 8, 16 or 32, png 8 or 16, pfm and hdr 32",
+                      .otherwise = "exr, tif, pfm and hdr 32, png 16",
+                      .example = "32"}});
     return object;
 }
 
 const Object& scene()
 {
-    static const Object object{
-        "scene",
-        "A light, what casts, what receives.",
-        {{.name = "scene",
-          .of = {},
-          .meaning = {},
-          .keys = {{.name = "penumbra", .type = Constant{1}, .meaning = "the version of the file", .required = true, .example = "1"},
-                   {.name = "light",
-                    .type = One{light},
-                    .meaning = "the light",
-                    .otherwise = "needed, or `lights`",
-                    .example = R"({"kind": "point", "center": [0, 6, 0]})"},
-                   {.name = "lights",
-                    .type = List{listed_light, 1, max_lights},
-                    .meaning = "several lights: a mask of each, and one of all together",
-                    .otherwise = "needed, or `light`",
-                    .example = R"([{"kind": "point", "center": [0, 6, 0], "name": "lamp"}])"},
-                   {.name = "objects",
-                    .type = List{scene_file::object, 0, any_number},
-                    .meaning = "surfaces that cast, receive or both",
-                    .fallback = "[]",
-                    .example = R"([{"mesh": "bunny.obj"}])"},
-                   {.name = "occluders",
-                    .type = One{occluders},
-                    .meaning = "depth seen from the light, or how to render it from `objects`",
-                    .fallback = "{}",
-                    .example = R"({"resolution": [512, 512]})"},
-                   {.name = "receivers",
-                    .type = One{receivers},
-                    .meaning = "depth of what is shaded, or how to render it from `objects`",
-                    .fallback = "{}",
-                    .example = R"({"depth": "receiver.exr"})"},
-                   {.name = "technique",
-                    .type = TechniqueKeys{},
-                    .meaning = "how the mask is computed",
-                    .otherwise = "`soft_shadow_map`; where all that casts is depth objects, `depth_trace`",
-                    .example = R"({"kind": "ray_traced"})"},
-                   {.name = "output",
-                    .type = One{output},
-                    .meaning = "format of the mask",
-                    .otherwise = "by the mask's file name",
-                    .example = R"({"format": "exr"})"}},
-          .exactly_one = {"light", "lights"}}}};
+    static const Object object =
+        of_one_form("scene", "A light, what casts, what receives.",
+                    {{.name = "penumbra", .type = Constant{1}, .meaning = "the version of the file", .required = true, .example = "1"},
+                     {.name = "light",
+                      .type = One{light},
+                      .meaning = "the light",
+                      .otherwise = "needed, or `lights`",
+                      .example = R"({"kind": "point", "center": [0, 6, 0]})"},
+                     {.name = "lights",
+                      .type = List{listed_light, 1, max_lights},
+                      .meaning = "several lights: a mask of each, and one of all together",
+                      .otherwise = "needed, or `light`",
+                      .example = R"([{"kind": "point", "center": [0, 6, 0], "name": "lamp"}])"},
+                     {.name = "objects",
+                      .type = List{scene_file::object, 0, any_number},
+                      .meaning = "surfaces that cast, receive or both",
+                      .fallback = "[]",
+                      .example = R"([{"mesh": "bunny.obj"}])"},
+                     {.name = "occluders",
+                      .type = One{occluders},
+                      .meaning = "depth seen from the light, or how to render it from `objects`",
+                      .fallback = "{}",
+                      .example = R"({"resolution": [512, 512]})"},
+                     {.name = "receivers",
+                      .type = One{receivers},
+                      .meaning = "depth of what is shaded, or how to render it from `objects`",
+                      .fallback = "{}",
+                      .example = R"({"depth": "receiver.exr"})"},
+                     {.name = "technique",
+                      .type = TechniqueKeys{},
+                      .meaning = "how the mask is computed",
+                      .otherwise = "`soft_shadow_map`; where all that casts is depth objects, `depth_trace`",
+                      .example = R"({"kind": "ray_traced"})"},
+                     {.name = "output",
+                      .type = One{output},
+                      .meaning = "format of the mask",
+                      .otherwise = "by the mask's file name",
+                      .example = R"({"format": "exr"})"}},
+                    {"light", "lights"});
     return object;
 }
 

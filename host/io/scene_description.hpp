@@ -40,6 +40,7 @@ struct Files {  // a list of them
     std::size_t low, high;
     bool or_one; // may be one file instead of a list
 };
+struct FileTable {}; // an object of files, by names that are free
 struct Numbers { // a vector or matrix of that many, each within `largest`
     std::size_t count;
 };
@@ -60,7 +61,7 @@ struct List { // of objects
 };
 struct TechniqueKeys {}; // a kind of technique_table() and its settings
 
-using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, Numbers, LengthOrAuto, NameOrNumber, Pair, Size, One, List, TechniqueKeys>;
+using Type = std::variant<Constant, Number, OneOfIntegers, Boolean, Text, File, Files, FileTable, Numbers, LengthOrAuto, NameOrNumber, Pair, Size, One, List, TechniqueKeys>;
 
 // --- Keys, forms, objects --------------------------------------------------------------------------------------------------------
 
@@ -92,6 +93,9 @@ struct Object {
 
 // The key whose value decides an object's form.
 Key kind(std::string_view name);
+
+// An object of one form, `exactly_one` being the form's.
+Object of_one_form(std::string_view name, std::string_view meaning, std::vector<Key> keys, std::vector<std::string_view> exactly_one = {});
 
 const Object& scene();
 const Object& light();        // forms in the order of the variant Light
@@ -129,7 +133,7 @@ std::vector<std::string_view> kinds_of(const Object& object);
 std::string expected(const Number& number);
 std::string expected(const OneOfIntegers& integers);
 
-// Where file names stand: "lights[].emission[]", [] being each element of a list.
+// Where file names stand: "lights[].emission[]", [] being each element of a list and {} each member of a table.
 const std::vector<std::string>& file_places();
 
 } // namespace penumbra::scene_file

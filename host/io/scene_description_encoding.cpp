@@ -106,23 +106,19 @@ const Object& encoding()
 
 const Object& anchor()
 {
-    static const Object object{"anchor",
-                               "A pixel of known depth.",
-                               {{.name = "anchor",
-                                 .of = {},
-                                 .meaning = {},
-                                 .keys = {{.name = "pixel",
-                                           .type = Numbers{2},
-                                           .meaning = "column and row, from 0 at the top left",
-                                           .unit = "pixels",
-                                           .required = true,
-                                           .example = "[0, 0]"},
-                                          {.name = "depth",
-                                           .type = Number{.low = 0, .above_low = true},
-                                           .meaning = "planar depth there",
-                                           .unit = "length",
-                                           .required = true,
-                                           .example = "2"}}}}};
+    static const Object object = of_one_form("anchor", "A pixel of known depth.",
+                                             {{.name = "pixel",
+                                               .type = Numbers{2},
+                                               .meaning = "column and row, from 0 at the top left",
+                                               .unit = "pixels",
+                                               .required = true,
+                                               .example = "[0, 0]"},
+                                              {.name = "depth",
+                                               .type = Number{.low = 0, .above_low = true},
+                                               .meaning = "planar depth there",
+                                               .unit = "length",
+                                               .required = true,
+                                               .example = "2"}});
     return object;
 }
 

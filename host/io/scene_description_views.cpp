@@ -155,6 +155,7 @@ void add_places(const Object& object, const std::string& prefix, std::vector<std
         for (const Key& key : form.keys) {
             const std::string at = prefix + std::string(key.name);
             if (std::holds_alternative<File>(key.type)) add(at);
+            if (std::holds_alternative<FileTable>(key.type)) add(at + "{}");
             if (const auto* files = std::get_if<Files>(&key.type)) {
                 if (files->or_one) add(at);
                 add(at + "[]");
@@ -167,6 +168,11 @@ void add_places(const Object& object, const std::string& prefix, std::vector<std
 } // namespace
 
 Key kind(std::string_view name) { return {.name = "kind", .type = Constant{name}, .meaning = "decides the other keys", .required = true}; }
+
+Object of_one_form(std::string_view name, std::string_view meaning, std::vector<Key> keys, std::vector<std::string_view> exactly_one)
+{
+    return {name, meaning, {{.name = name, .of = {}, .meaning = {}, .keys = std::move(keys), .exactly_one = std::move(exactly_one)}}};
+}
 
 const Object& camera()
 {
@@ -182,14 +188,11 @@ const Object& intrinsics()
         return Key{.name = name, .type = std::move(type), .meaning = meaning, .unit = "pixels", .required = true, .example = example};
     };
     constexpr Number length{.low = 0, .above_low = true};
-    static const Object object{"intrinsics",
-                               "A lens as calibration gives it. (0, 0) is the image's top left corner, (0.5, 0.5) the first pixel's middle.",
-                               {{.name = "intrinsics",
-                                 .of = {},
-                                 .meaning = {},
-                                 .keys = {key("fx", length, "focal length across", "500"), key("fy", length, "focal length down", "500"),
-                                          key("cx", Number{}, "where the viewing axis meets the image, from the left", "320"),
-                                          key("cy", Number{}, "the same, from the top", "240")}}}};
+    static const Object object = of_one_form(
+        "intrinsics", "A lens as calibration gives it. (0, 0) is the image's top left corner, (0.5, 0.5) the first pixel's middle.",
+        {key("fx", length, "focal length across", "500"), key("fy", length, "focal length down", "500"),
+         key("cx", Number{}, "where the viewing axis meets the image, from the left", "320"),
+         key("cy", Number{}, "the same, from the top", "240")});
     return object;
 }
 
@@ -220,39 +223,31 @@ const Object& occluder_depth()
 
 const Object& occluders()
 {
-    static const Object object{
-        "occluders",
-        "Depth of what casts shadows, seen from the light.",
-        {{.name = "occluders",
-          .of = {},
-          .meaning = {},
-          .keys = viewed("the light's own view; a `pinhole` must be the same view", "the images' size; `[256, 256]` without any",
-                         {.name = "depth",
-                          .type = One{occluder_depth},
-                          .meaning = "images of depth",
-                          .otherwise = "rendered from `objects`",
-                          .example = R"({"front": "front.exr"})"})}}};
+    static const Object object =
+        of_one_form("occluders", "Depth of what casts shadows, seen from the light.",
+                    viewed("the light's own view; a `pinhole` must be the same view", "the images' size; `[256, 256]` without any",
+                           {.name = "depth",
+                            .type = One{occluder_depth},
+                            .meaning = "images of depth",
+                            .otherwise = "rendered from `objects`",
+                            .example = R"({"front": "front.exr"})"}));
     return object;
 }
 
 const Object& receivers()
 {
-    static const Object object{"receivers",
-                               "Depth of what is shaded. The mask has its viewpoint and resolution.",
-                               {{.name = "receivers",
-                                 .of = {},
-                                 .meaning = {},
-                                 .keys = viewed("the viewpoint", "the image's size; `[512, 512]` without one",
-                                                {.name = "depth",
-                                                 .type = File{},
-                                                 .meaning = "image of depth",
-                                                 .otherwise = "rendered from `objects`",
-                                                 .example = "\"receiver.exr\""},
-                                                Key{.name = "position",
-                                                 .type = File{},
-                                                 .meaning = "image of world positions, in place of `depth`; needs a pinhole camera",
-                                                 .otherwise = "`depth`",
-                                                 .example = "\"position.exr\""})}}};
+    static const Object object = of_one_form("receivers", "Depth of what is shaded. The mask has its viewpoint and resolution.",
+                                             viewed("the viewpoint", "the image's size; `[512, 512]` without one",
+                                                    {.name = "depth",
+                                                     .type = File{},
+                                                     .meaning = "image of depth",
+                                                     .otherwise = "rendered from `objects`",
+                                                     .example = "\"receiver.exr\""},
+                                                    Key{.name = "position",
+                                                        .type = File{},
+                                                        .meaning = "image of world positions, in place of `depth`; needs a pinhole camera",
+                                                        .otherwise = "`depth`",
+                                                        .example = "\"position.exr\""}));
     return object;
 }
 

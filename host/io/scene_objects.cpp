@@ -61,17 +61,24 @@ ObjectPlacement placement_of(const JsonObject& section)
             .translation = translate ? translate->vec3() : Vec3(0, 0, 0)};
 }
 
-// Files that a mesh names lie where it lies: beside it, or among the parts of the request.
+// A file that the mesh names: where `files` says that it lies, else beside the mesh, or among the parts of the request.
+std::string place_of(const std::string& named, const std::string& mesh, const std::optional<JsonValue>& files)
+{
+    if (!files) return (std::filesystem::path(mesh).parent_path() / named).string();
+    if (const auto file = JsonObject(*files).find(named)) return file->text();
+    throw Error(ErrorCode::not_found, "`files` of the mesh has no such name");
+}
+
 TriangleMesh read_mesh_file(const JsonObject& section, const Resources& resources, std::vector<std::string>& warnings)
 {
     const JsonValue name = section.need("mesh");
     const std::string file = name.text();
-    const auto weld = section.find("weld");
+    const auto weld = section.find("weld"), files = section.find("files");
     MeshOptions options{.placement = placement_of(section), .weld = weld ? weld->number() : 0, .companion = {}};
     options.max_samples = resources.max_samples();
     options.warnings = &warnings;
     options.companion = [&](const std::string& other) {
-        const std::string path = resources.path((std::filesystem::path(file).parent_path() / other).string());
+        const std::string path = resources.path(place_of(other, file, files));
         return Bytes(read_file(path, path));
     };
     return under(name, [&] {

@@ -65,6 +65,7 @@ struct TypeSchema {
         Json list = array_of((*this)(File{}), files.low, files.high);
         return files.or_one ? Json{{"anyOf", {(*this)(File{}), list}}} : list;
     }
+    Json operator()(const FileTable&) const { return {{"type", "object"}, {"additionalProperties", (*this)(File{})}}; }
     Json operator()(const Numbers& numbers) const { return array_of((*this)(Number{}), numbers.count, numbers.count); }
     Json operator()(const LengthOrAuto&) const
     {

@@ -52,6 +52,7 @@ struct TypeWords {
     {
         return (files.or_one ? "file, or " : "") + count_words(files.low, files.high, "files");
     }
+    std::string operator()(const FileTable&) const { return "object of files"; }
     std::string operator()(const Numbers& numbers) const
     {
         return numbers.count == 3 ? "`[x, y, z]`" : numbers.count == 2 ? "`[x, y]`" : std::to_string(numbers.count) + " numbers";
@@ -182,7 +183,7 @@ std::string cpp_file_places()
 {
     return "// Made by `penumbra_describe_scene --cpp` from the description of the scene file.\n"
            "#pragma once\n\n#include <array>\n#include <string_view>\n\nnamespace penumbra::client::detail {\n\n"
-           "// Where a scene names files; [] is each element of a list.\n"
+           "// Where a scene names files; [] is each element of a list, {} each member of a table.\n"
            "inline constexpr std::array<std::string_view, " +
            std::to_string(file_places().size()) + "> file_places{\n" + listed("    ", ",\n") +
            "};\n\n} // namespace penumbra::client::detail\n";
@@ -191,7 +192,7 @@ std::string cpp_file_places()
 std::string python_file_places()
 {
     return "\"\"\"Made by `penumbra_describe_scene --python` from the description of the scene file.\"\"\"\n\n"
-           "# Where a scene names files; [] is each element of a list.\nFILE_PLACES = (\n" +
+           "# Where a scene names files; [] is each element of a list, {} each member of a table.\nFILE_PLACES = (\n" +
            listed("    ", ",\n") + ")\n";
 }
 

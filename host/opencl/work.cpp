@@ -8,6 +8,7 @@
 #include "opencl/errors.hpp"
 #include "opencl/ledger.hpp"
 #include "opencl/linker.hpp"
+#include "scene/memory.hpp"
 
 namespace penumbra::opencl {
 namespace {
@@ -184,6 +185,7 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes,
         throw refuse(device.name + " has " + bytes_text(device.global_bytes) + ", of which " + bytes_text(context_->ledger()->live()) +
                      " are in use");
     }
+    if (context_->quirks().host_memory) require_memory(static_cast<double>(whole), what);
     guard->take(whole);
 
     try {

@@ -6,6 +6,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/camera.hpp"
+#include "scene/memory.hpp"
 #include "scene/stop.hpp"
 #include "silhouette/silhouette.hpp"
 
@@ -13,6 +14,7 @@ namespace penumbra {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffff;
+constexpr double bytes_per_texel = 100;
 
 // Texels by what is linear on planes: disparity, an orthographic camera's depth; 0: nothing there. And which neighbours are joined.
 class Texels {
@@ -120,6 +122,8 @@ TriangleMesh mesh_of_texels(const DepthMap& map, const Camera& camera)
     if (map.depth.size() >= none / 4)
         throw Error(ErrorCode::too_large, "depth map: " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels",
                     "expected fewer than " + std::to_string(none / 4));
+    // Vertices, their values, two triangles, and what vectors that grow hold for a moment.
+    require_memory(bytes_per_texel * static_cast<double>(map.depth.size()), "surfaces of a depth map of " + std::to_string(map.width) + " x " + std::to_string(map.height));
     const Texels texels(map, camera.orthographic);
     TriangleMesh mesh;
 

@@ -6,6 +6,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/weld.hpp"
+#include "scene/memory.hpp"
 #include "silhouette/edges.hpp"
 
 namespace penumbra {
@@ -13,6 +14,8 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 using EdgeUse = Topology::EdgeUse;
+
+constexpr double bytes_per_triangle = 250; // at the most, while it is made
 
 bool finite(const Imath::V3f& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -41,6 +44,7 @@ void check_sizes(std::span<const TriangleMesh* const> meshes)
     if (3 * triangles >= no_side)
         throw Error(ErrorCode::too_large, "meshes: " + std::to_string(triangles) + " triangles",
                     "expected fewer than " + std::to_string(no_side / 3));
+    require_memory(bytes_per_triangle * static_cast<double>(triangles), "the edges of " + std::to_string(triangles) + " triangles");
 }
 
 // Ordered by (low, high, triangle): buckets by the lower vertex, in order within, as they are small.

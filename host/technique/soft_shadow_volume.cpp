@@ -5,6 +5,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/memory.hpp"
 #include "scene/parallel.hpp"
 #include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
@@ -98,6 +99,14 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
             .first = 0};
 }
 
+// What of a part goes to the device.
+double bytes_of(const WedgeData& data)
+{
+    const std::size_t floats = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() + data.triangle_boxes.size() +
+                               data.triangle_extents.size() + data.triangles.size();
+    return static_cast<double>(floats) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
+}
+
 PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data, const WedgeLight& light)
 {
     const auto floats = [&](const std::vector<float>& values, const char* what) {
@@ -182,6 +191,10 @@ void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolu
     prepared.channels = emission.channels;
     prepared.program = program(work.context().quirks().lanes, frame.shape, prepared.settings, emission.channels);
     const std::vector<LightPart> parts = light_parts(frame, splits);
+    // Of all parts, before the first is made.
+    if (work.context().quirks().host_memory)
+        require_memory(4 * std::pow(table, 4) * emission.channels * static_cast<double>(parts.size()),
+                       std::to_string(parts.size()) + " coverage tables (technique.table, light_splits)");
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const EmissionPart lit = emission_part(emission, parts[i], splits);
         prepared.parts[i].coverage = coverage_table(work, prepared.program, emission, lit, table);
@@ -289,6 +302,10 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
         });
         for (std::size_t i = 0; i < count; ++i) {
             const auto& [wedges, data, sheets] = batch[i];
+            // All see the same casters, and take about as much as the first.
+            if (first + i == 0 && parts.size() > 1 && work.context().quirks().host_memory)
+                require_memory(bytes_of(data) * static_cast<double>(parts.size()),
+                               std::to_string(parts.size()) + " parts of the light with wedges of their own (technique.light_splits)");
             prepared.edges += data.edge_count;
             prepared.triangles += data.triangle_count;
             prepared.sheets += sheets;

@@ -11,6 +11,7 @@
 
 #include "http/connection.hpp"
 #include "http/service_http.hpp"
+#include "process/memory.hpp"
 
 namespace penumbra::server {
 namespace {
@@ -32,7 +33,7 @@ LobbyLimits limits_of(const Options& options)
     return {.connections = static_cast<std::size_t>(options.connections),
             .header_time = std::chrono::seconds(options.header_s),
             .header_bytes = static_cast<std::size_t>(options.header_bytes),
-            .answer_bytes = static_cast<std::uint64_t>(options.answer_bytes),
+            .answer_bytes = answers_memory(options),
             .forget_bytes = static_cast<std::size_t>(options.body_bytes),
             .slowest_transfer = static_cast<std::uint64_t>(options.transfer_bytes_s)};
 }
@@ -136,6 +137,7 @@ Service::Service(Options options, Log log, std::string program)
     : options_(std::move(options)), log_(std::move(log)),
       gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)), pool_(pool_of(options_, std::move(program)), log_),
       greeting_(greeting_of(pool_)), device_(greeting_.device + "\n" + greeting_.driver),
+      uploads_(uploads_memory(options_)),
       scenes_(static_cast<std::uint64_t>(options_.scenes_bytes), static_cast<std::size_t>(options_.scenes),
               std::chrono::seconds(options_.scenes_s)),
       id_prefix_(random_prefix()), started_s_(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),

@@ -66,7 +66,8 @@ private:
     void check_body_headers(const Request& request, const Route& route) const;
 
     // service_masks.cpp: what computes.
-    SharedBytes read_body(const Request& request) const;
+    SharedBytes read_body(const Request& request);
+    Room::Hold room_for(std::size_t bytes);
     void post_mask(const Request& request, Response& response);
     void post_scene(const Request& request, Response& response);
     void post_depth(const Request& request, Response& response);
@@ -93,6 +94,7 @@ private:
     const Greeting greeting_;
     const std::string device_; // and its driver, as masks depend on them
     Crashes crashes_;
+    Room uploads_; // bodies and kept scenes
     StoreOf<KeptUpload> scenes_;
     mutable Metrics metrics_;
     const std::string id_prefix_;

@@ -58,13 +58,30 @@ private:
 
 } // namespace
 
+// Room for a body. Kept scenes give way, the longest unused first.
+Room::Hold Service::room_for(std::size_t bytes)
+{
+    if (bytes > uploads_.size())
+        throw Problem(413, "memory",
+                      "the body has " + std::to_string(bytes) + " bytes; all bodies and kept scenes together may take " + std::to_string(uploads_.size()) +
+                          " of memory");
+    for (;;) {
+        if (std::optional<Room::Hold> hold = uploads_.take(bytes)) return std::move(*hold);
+        if (!scenes_.forget_one())
+            throw Problem(503, "memory",
+                          "bodies in flight take " + std::to_string(uploads_.taken()) + " of " + std::to_string(uploads_.size()) +
+                              " bytes of memory, and this one needs " + std::to_string(bytes) + "; try again",
+                          1);
+    }
+}
+
 // The body, whole, as long as announced. It goes past the HTTP library's reader, which copies it twice.
-SharedBytes Service::read_body(const Request& request) const
+SharedBytes Service::read_body(const Request& request)
 {
     Connection& connection = Connection::current();
     const auto uploading = Deadline::Clock::now();
     const std::size_t length = static_cast<std::size_t>(length_from(request.get_header_value("Content-Length")).value_or(0));
-    SharedBytes body(length);
+    SharedBytes body(length, room_for(length));
     const std::size_t came = connection.read_body(body.data(), length);
     if (connection.too_slow())
         throw Problem(408, "slow_body",
@@ -110,6 +127,7 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
         throw;
     }
     if (!call.id.empty()) worker.keeps(call.id);
+    if (crashes_.any()) crashes_.absolve(digest());
     CallReply answer = reply_from(message.text);
     if (!answer.problem) return answer;
     Connection::current().inside = answer.inside;

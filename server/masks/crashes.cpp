@@ -20,17 +20,25 @@ void Crashes::note(const std::string& digest)
     any_ = true;
 }
 
+void Crashes::absolve(const std::string& digest)
+{
+    const std::scoped_lock lock(mutex_);
+    if (const auto entry = at(digest); entry != entries_.end()) entries_.erase(entry);
+    any_ = !entries_.empty();
+}
+
+void Crashes::tidy()
+{
+    std::erase_if(entries_, [now = now_()](const Entry& entry) { return now - entry.last >= time; });
+    any_ = !entries_.empty();
+}
+
 void Crashes::check(const std::string& digest)
 {
     const std::scoped_lock lock(mutex_);
+    tidy();
     const auto entry = at(digest);
-    if (entry == entries_.end()) return;
-    if (now_() - entry->last >= time) {
-        entries_.erase(entry);
-        any_ = !entries_.empty();
-        return;
-    }
-    if (entry->deaths < most_deaths) return;
+    if (entry == entries_.end() || entry->deaths < most_deaths) return;
     const auto left = std::chrono::duration_cast<std::chrono::seconds>(entry->last + time - now_()).count() + 1;
     throw Problem(422, "crashed", "this request ended " + std::to_string(entry->deaths) + " of the service's processes and is not tried again for a while",
                   static_cast<int>(left));

@@ -1,4 +1,4 @@
-// Requests that ended their worker: what did it twice is not tried again for a while.
+// Requests that ended their worker: what did it twice, and never came through between, is not tried again for a while.
 #pragma once
 
 #include <atomic>
@@ -22,6 +22,8 @@ public:
     explicit Crashes(Now now = Clock::now) : now_(std::move(now)) {}
     bool any() const { return any_; } // whether a request's digest is worth making
     void note(const std::string& digest);
+    // It came through: its worker had been ended by something else.
+    void absolve(const std::string& digest);
     // Throws Problem 422 for one that ended most_deaths workers within `time`.
     void check(const std::string& digest);
 
@@ -32,6 +34,7 @@ private:
         Clock::time_point last;
     };
     std::list<Entry>::iterator at(const std::string& digest);
+    void tidy();
     const Now now_;
     std::atomic<bool> any_ = false;
     std::mutex mutex_;

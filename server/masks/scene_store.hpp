@@ -33,6 +33,9 @@ public:
     // Throws Problem 413 for one that is larger than the whole budget.
     void keep(const std::shared_ptr<Scene>& scene);
     bool forget(std::string_view id);
+    void clear();
+    // Lets go of the longest unused; false when there is none.
+    bool forget_one();
     // Whole seconds that the scene has left.
     std::int64_t seconds_left(std::string_view id);
     // Lets go what is too old or too much; to be called when a scene has grown by its use.
@@ -98,6 +101,22 @@ template <class Scene> bool StoreOf<Scene>::forget(std::string_view id)
     const auto found = at(id);
     if (found == entries_.end()) return false;
     entries_.erase(found);
+    return true;
+}
+
+template <class Scene> void StoreOf<Scene>::clear()
+{
+    const std::scoped_lock lock(mutex_);
+    entries_.clear();
+}
+
+template <class Scene> bool StoreOf<Scene>::forget_one()
+{
+    std::shared_ptr<Scene> gone; // after the lock
+    const std::scoped_lock lock(mutex_);
+    if (entries_.empty()) return false;
+    gone = std::move(entries_.back().scene);
+    entries_.pop_back();
     return true;
 }
 

@@ -1,5 +1,6 @@
 #include "masks/worker.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <new>
@@ -42,7 +43,7 @@ class Worker {
 public:
     Worker(const Options& options, const Engine& engine)
         : options_(options), engine_(engine),
-          scenes_(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), static_cast<std::size_t>(options.scenes),
+          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), worker_memory(options) / 4), static_cast<std::size_t>(options.scenes),
                   std::chrono::seconds(options.scenes_s))
     {
     }
@@ -61,13 +62,25 @@ public:
         for (Descriptor& file : files) shared.emplace_back(std::move(file));
         shared.resize(2);
         try {
-            return done(call, shared, deadline, bytes);
+            return with_room(call, shared, deadline, bytes);
         } catch (const Stopped&) {
             throw deadline.over();
         }
     }
 
 private:
+    // Once more without the scenes that are kept decoded, if memory was short: the service has what they are made from.
+    CallReply with_room(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    {
+        try {
+            return done(call, shared, deadline, bytes);
+        } catch (const std::bad_alloc&) {
+            if (scenes_.counts().scenes == 0) throw;
+        }
+        scenes_.clear();
+        return done(call, shared, deadline, bytes);
+    }
+
     CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
     {
         switch (call.kind) {
@@ -174,7 +187,7 @@ private:
 };
 
 // Runs it; whatever it throws becomes an answer.
-template <class Call> CallReply guarded(const Call& call)
+template <class Call> CallReply guarded(const Call& call, std::uint64_t memory)
 {
     CallReply answer;
     try {
@@ -185,7 +198,7 @@ template <class Call> CallReply guarded(const Call& call)
         answer.problem = problem_from(error);
         answer.inside = error.what();
     } catch (const std::bad_alloc&) {
-        answer.problem = out_of_memory();
+        answer.problem = out_of_memory(memory);
     } catch (const std::exception& error) {
         answer.problem = defect();
         answer.inside = error.what();
@@ -236,7 +249,7 @@ int work(const Options& options, const std::string& temporary, Channel channel)
             continue;
         }
         Descriptor bytes;
-        const CallReply answer = guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); });
+        const CallReply answer = guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
         const int file = bytes.get();
         if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
     }

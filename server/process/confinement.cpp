@@ -38,10 +38,13 @@ bool write_file(const char* path, const std::string& text)
 }
 
 constexpr std::uint64_t reads = LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+// REFER: moving a file to another folder, which PoCL does with each library that it has linked. Where it is not handled it is refused.
 constexpr std::uint64_t writes = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |
                                  LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG | LANDLOCK_ACCESS_FS_MAKE_SYM |
                                  LANDLOCK_ACCESS_FS_MAKE_FIFO | LANDLOCK_ACCESS_FS_MAKE_SOCK | LANDLOCK_ACCESS_FS_MAKE_CHAR |
-                                 LANDLOCK_ACCESS_FS_MAKE_BLOCK;
+                                 LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_REFER;
+constexpr std::uint64_t truncate = std::uint64_t{1} << 14; // LANDLOCK_ACCESS_FS_TRUNCATE, of kernels newer than Debian 12's headers
+constexpr long version_of_refer = 2, version_of_truncate = 3;
 
 // A folder that is not there needs no rule.
 void open_folder(int rules, const std::string& folder, std::uint64_t access)
@@ -80,6 +83,17 @@ constexpr std::uint32_t this_machine = AUDIT_ARCH_AARCH64;
 
 constexpr sock_filter step(std::uint16_t code, std::uint32_t value, std::uint8_t yes = 0, std::uint8_t no = 0) { return {code, yes, no, value}; }
 constexpr std::uint32_t refused = SECCOMP_RET_ERRNO | EPERM;
+
+// A call is allowed with these values of an argument (its lower half), and refused with others.
+void allow_with(std::vector<sock_filter>& program, long call, int argument, const std::vector<std::uint32_t>& values)
+{
+    const auto count = static_cast<std::uint8_t>(values.size());
+    program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, static_cast<std::uint8_t>(count + 3)));
+    program.push_back(step(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offsetof(seccomp_data, args) + 8 * static_cast<std::size_t>(argument))));
+    for (std::uint8_t i = 0; i < count; ++i) program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, values[i], static_cast<std::uint8_t>(count - i), 0));
+    program.push_back(step(BPF_RET | BPF_K, refused));
+    program.push_back(step(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+}
 
 } // namespace
 
@@ -127,13 +141,16 @@ OpenFolders folders_of_a_worker(const std::string& temporary)
 
 bool close_files(const OpenFolders& folders)
 {
-    const landlock_ruleset_attr handled{.handled_access_fs = reads | writes};
+    const long version = syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
+    if (version < version_of_refer) return false;
+    const std::uint64_t all = reads | writes | (version >= version_of_truncate ? truncate : 0);
+    const landlock_ruleset_attr handled{.handled_access_fs = all};
     const Descriptor rules(static_cast<int>(syscall(SYS_landlock_create_ruleset, &handled, sizeof(handled), 0)));
     if (!rules) return false;
     for (const std::string& folder : folders.read) open_folder(rules.get(), folder, reads);
-    for (const std::string& folder : folders.write) open_folder(rules.get(), folder, reads | writes);
+    for (const std::string& folder : folders.write) open_folder(rules.get(), folder, all);
     open_folder(rules.get(), "/dev", reads | LANDLOCK_ACCESS_FS_WRITE_FILE);
-    open_folder(rules.get(), "/dev/shm", reads | writes);
+    open_folder(rules.get(), "/dev/shm", all);
     return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && syscall(SYS_landlock_restrict_self, rules.get(), 0) == 0;
 }
 
@@ -141,20 +158,29 @@ bool close_calls()
 {
     constexpr std::array closed{SYS_ptrace,       SYS_process_vm_readv, SYS_process_vm_writev, SYS_mount,      SYS_umount2,      SYS_pivot_root,
                                 SYS_bpf,          SYS_perf_event_open,  SYS_init_module,       SYS_finit_module, SYS_delete_module, SYS_kexec_load,
-                                SYS_add_key,      SYS_request_key,      SYS_keyctl,            SYS_userfaultfd, SYS_setns,        SYS_unshare};
+                                SYS_add_key,      SYS_request_key,      SYS_keyctl,            SYS_userfaultfd, SYS_setns,        SYS_unshare,
+                                // Queues of calls, sockets among them, that this filter does not see; other processes.
+                                SYS_io_uring_setup, SYS_io_uring_enter, SYS_io_uring_register, SYS_pidfd_getfd, SYS_pidfd_send_signal,
+                                SYS_process_madvise, SYS_tkill, SYS_rt_sigqueueinfo, SYS_rt_tgsigqueueinfo, SYS_setpriority};
     std::vector<sock_filter> program{step(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)),
                                      step(BPF_JMP | BPF_JEQ | BPF_K, this_machine, 1, 0),
                                      step(BPF_RET | BPF_K, refused),
                                      step(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+#if defined(__x86_64__)
+    // The same calls under other numbers (x32).
+    program.push_back(step(BPF_JMP | BPF_JGE | BPF_K, 0x40000000, 0, 1));
+    program.push_back(step(BPF_RET | BPF_K, refused));
+#endif
     for (const long call : closed) {
         program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 1));
         program.push_back(step(BPF_RET | BPF_K, refused));
     }
-    // socket(2): of its own machine only.
-    program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, SYS_socket, 0, 3));
-    program.push_back(step(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args)));
-    program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, AF_UNIX, 1, 0));
-    program.push_back(step(BPF_RET | BPF_K, refused));
+    // Sockets of its own machine only; signals to itself (as abort(3) sends); limits of its own (0: the caller's).
+    const auto self = static_cast<std::uint32_t>(getpid());
+    allow_with(program, SYS_socket, 0, {AF_UNIX});
+    allow_with(program, SYS_kill, 0, {self});
+    allow_with(program, SYS_tgkill, 0, {self});
+    allow_with(program, SYS_prlimit64, 0, {0, self});
     program.push_back(step(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
     const sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
     return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC, &filter) == 0;

@@ -11,5 +11,8 @@ namespace penumbra::server {
 std::uint64_t memory_limit(const Options& options);
 // Three quarters of that are the workers', in even shares.
 std::uint64_t worker_memory(const Options& options);
+// The last quarter is the service's own: bodies with the scenes that are kept, answers that wait for their clients, and its code.
+std::uint64_t uploads_memory(const Options& options);
+std::uint64_t answers_memory(const Options& options);
 
 } // namespace penumbra::server

@@ -1,6 +1,7 @@
 // Errors as the caller of the service sees them: application/problem+json (RFC 9457).
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <string>
 #include <string_view>
@@ -27,8 +28,9 @@ Problem problem_from(const Error& error);
 // Any other exception: its text says nothing to the outside.
 Problem defect();
 
-// std::bad_alloc: 503.
+// std::bad_alloc: 503 of the service itself, which may have more later; 413 of a worker, which has `bytes` and no more.
 Problem out_of_memory();
+Problem out_of_memory(std::uint64_t bytes);
 
 // What was under way when the service was told to end.
 Problem service_ends();

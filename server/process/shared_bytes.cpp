@@ -33,7 +33,7 @@ char* mapped(const Descriptor& file, std::size_t size, int protection)
 
 } // namespace
 
-SharedBytes::SharedBytes(std::size_t size) : file_(new_file()), size_(size)
+SharedBytes::SharedBytes(std::size_t size, Room::Hold hold) : hold_(std::move(hold)), file_(new_file()), size_(size)
 {
     if (ftruncate(file_.get(), static_cast<off_t>(size)) != 0) throw std::bad_alloc();
     bytes_ = mapped(file_, size, PROT_READ | PROT_WRITE);
@@ -42,12 +42,13 @@ SharedBytes::SharedBytes(std::size_t size) : file_(new_file()), size_(size)
 SharedBytes::SharedBytes(Descriptor file) : file_(std::move(file)), size_(size_of(file_)) { bytes_ = mapped(file_, size_, PROT_READ); }
 
 SharedBytes::SharedBytes(SharedBytes&& other) noexcept
-    : file_(std::move(other.file_)), bytes_(std::exchange(other.bytes_, nullptr)), size_(std::exchange(other.size_, 0))
+    : hold_(std::move(other.hold_)), file_(std::move(other.file_)), bytes_(std::exchange(other.bytes_, nullptr)), size_(std::exchange(other.size_, 0))
 {
 }
 
 SharedBytes& SharedBytes::operator=(SharedBytes&& other) noexcept
 {
+    std::swap(hold_, other.hold_);
     std::swap(file_, other.file_);
     std::swap(bytes_, other.bytes_);
     std::swap(size_, other.size_);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "process/descriptor.hpp"
+#include "process/room.hpp"
 
 namespace penumbra::server {
 
@@ -13,7 +14,7 @@ class SharedBytes {
 public:
     SharedBytes() = default;
     // Room for so many bytes, zeros that take no memory until they are written. Throws std::bad_alloc.
-    explicit SharedBytes(std::size_t size);
+    explicit SharedBytes(std::size_t size, Room::Hold hold = {}); // which goes with them
     // What another process made, to read. Throws std::bad_alloc where it cannot be mapped.
     explicit SharedBytes(Descriptor file);
     SharedBytes(SharedBytes&& other) noexcept;
@@ -26,6 +27,7 @@ public:
     int descriptor() const { return file_.get(); }
 
 private:
+    Room::Hold hold_;
     Descriptor file_;
     char* bytes_ = nullptr;
     std::size_t size_ = 0;

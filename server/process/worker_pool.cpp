@@ -213,6 +213,19 @@ void WorkerPool::bury(Worker& worker, bool overdue)
     worker.used = Clock::time_point::min();
 }
 
+// With the mutex. Those that died while nobody asked them for anything: an idle one never says a word, so that its channel has one to read
+// only when it has ended. What is asked next is not to blame.
+void WorkerPool::bury_the_dead()
+{
+    for (const auto& worker : workers_) {
+        if (worker->state != State::idle) continue;
+        pollfd channel{worker->channel.descriptor(), POLLIN, 0};
+        if (::poll(&channel, 1, 0) <= 0) continue;
+        bury(*worker, false);
+        changed_.notify_all();
+    }
+}
+
 void WorkerPool::say_death(const Worker& worker, int status) const
 {
     say_("warning: worker " + std::to_string(worker.number) + " ended by " + death_of(status) + "; it starts again");
@@ -228,6 +241,7 @@ WorkerPool::Lease WorkerPool::lease(std::string_view name, const Deadline& deadl
         return a.keeps.size() != b.keeps.size() ? a.keeps.size() < b.keeps.size() : a.used > b.used; // rather the one whose memory is warm
     };
     const auto found = [&] {
+        bury_the_dead();
         best = nullptr;
         for (const auto& worker : workers_)
             if (worker->state == State::idle && (!best || better(*worker, *best))) best = worker.get();

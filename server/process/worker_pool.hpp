@@ -89,6 +89,7 @@ private:
     bool over() const; // with the mutex: nobody computes any more
     void supervise();
     void spawn(Worker& worker);
+    void bury_the_dead();
     void bury(Worker& worker, bool overdue);
     Worker* next_dead(Clock::time_point& when);
     void say_death(const Worker& worker, int status) const;

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 class BatchCommand : public CommandTest {
 protected:
-    BatchCommand() { fs::create_directory(path("scenes")); }
+    BatchCommand() : CommandTest("scenes") {}
 
     void write_scenes(int count) const
     {

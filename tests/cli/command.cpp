@@ -136,11 +136,12 @@ void write_text(const std::string& path, const std::string& text)
     ASSERT_TRUE(out.flush()) << path;
 }
 
-CommandTest::CommandTest()
+CommandTest::CommandTest(const std::string& below)
 {
     std::string name = (fs::temp_directory_path() / "penumbra_cli_XXXXXX").string();
     if (!::mkdtemp(name.data())) throw std::runtime_error("mkdtemp");
     folder_ = name;
+    if (!below.empty()) fs::create_directory(path(below));
 }
 
 CommandTest::~CommandTest()

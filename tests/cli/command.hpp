@@ -42,7 +42,7 @@ void write_text(const std::string& path, const std::string& text);
 // A folder that is gone afterwards.
 class CommandTest : public ::testing::Test {
 protected:
-    CommandTest();
+    explicit CommandTest(const std::string& below = {}); // with this folder in it
     ~CommandTest() override;
 
     std::string path(const std::string& name) const { return folder_ + "/" + name; }

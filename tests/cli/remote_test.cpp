@@ -218,18 +218,29 @@ TEST_F(RemoteMaskCommand, WrongUsageIsFoundBeforeAnythingIsSent)
 TEST_F(RemoteMaskCommand, WorkThatFails)
 {
     const std::string scene = write_scene("scene.json");
-    const auto expect_failure = [&](const std::string& reply, const std::vector<std::string>& said) {
-        FakeService fake({reply});
+    const auto expect_failure = [&](const std::string& reply, const std::vector<std::string>& said, int asked = 1) {
+        FakeService fake(std::vector<FakeService::Answer>(static_cast<std::size_t>(asked), reply));
         std::vector<std::string> parts{"--server " + fake.url};
         parts.insert(parts.end(), said.begin(), said.end());
         expect_one_error(penumbra({"mask", scene, "-o", path("mask.pfm"), "--server", fake.url}), 1, parts);
     };
     expect_failure(problem(500, "internal"), {"500: the detail"});
     expect_failure(problem(504, "deadline"), {"504: the detail"});
-    expect_failure("", {"connection broke"});
+    expect_failure("", {"connection broke"}, 2);
     expect_failure(answer(200, "<html>", "Content-Type: text/html\r\n"), {"text/html"});
     expect_one_error(penumbra({"mask", scene, "-o", path("mask.pfm"), "--server", "http://127.0.0.1:1"}), 1, {"nobody answers"});
     EXPECT_EQ(files(), (std::vector<std::string>{"scene.json"}));
+}
+
+TEST_F(RemoteMaskCommand, AsksOnceMoreWhereTheConnectionBroke)
+{
+    const std::string scene = write_scene("scene.json");
+    FakeService fake({std::string(), mask_answer()});
+    const Ran ran = penumbra({"mask", scene, "-o", path("mask.pfm"), "--server", fake.url});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    fake.finish();
+    EXPECT_EQ(fake.requests.size(), 2U);
+    EXPECT_EQ(read_image(path("mask.pfm")).pixels, (std::vector<float>{0.25F, 1}));
 }
 
 } // namespace

@@ -1,34 +1,19 @@
 // Scene files: names become parts.
-#include <filesystem>
-#include <fstream>
+#include <algorithm>
+#include <chrono>
 
 #include <gtest/gtest.h>
 
 #include <penumbra/client/scene_file.hpp>
 
+#include "clients/scene_folder.hpp"
+
 namespace penumbra::test {
 namespace {
 
 using Json = nlohmann::json;
-namespace fs = std::filesystem;
 
-class SceneFiles : public ::testing::Test {
-protected:
-    SceneFiles()
-    {
-        std::string name = (fs::temp_directory_path() / "penumbra_client_XXXXXX").string();
-        if (!::mkdtemp(name.data())) throw std::runtime_error("mkdtemp");
-        folder = name;
-    }
-    ~SceneFiles() override { fs::remove_all(folder); }
-    fs::path write(const std::string& name, const std::string& text) const
-    {
-        fs::create_directories((folder / name).parent_path());
-        std::ofstream(folder / name, std::ios::binary) << text;
-        return folder / name;
-    }
-    fs::path folder;
-};
+using SceneFiles = SceneFolder;
 
 TEST_F(SceneFiles, EveryPlaceThatNamesAFile)
 {
@@ -107,6 +92,34 @@ TEST_F(SceneFiles, Refusals)
     EXPECT_THROW((void)client::load_scene_file(folder / "none.json"), std::system_error);
     EXPECT_THROW((void)client::load_scene_file(folder), std::system_error);
     EXPECT_THROW((void)client::load_scene_file(write("scene.json", R"({"receivers": {"depth": "none.exr"}})")), std::system_error);
+}
+
+TEST_F(SceneFiles, FilesOfMeshesThatTheSceneNames)
+{
+    write("m.gltf", R"({"buffers": [{"uri": "not looked for.bin"}]})");
+    write("a b.bin", "x");
+    const client::SceneFile file = client::load_scene_file(
+        write("scene.json", R"({"objects": [{"mesh": "m.gltf", "files": {"n.bin": "a b.bin", "m.bin": "./a b.bin", "k": 3}}, {"files": []}]})"));
+    EXPECT_EQ(file.scene, Json::parse(R"({"objects": [{"mesh": "m.gltf", "files": {"n.bin": "a_b.bin", "m.bin": "a_b.bin", "k": 3}}, {"files": []}]})"));
+    EXPECT_EQ(file.images.at("a_b.bin"), "x");
+}
+
+// As long as the parser takes without looking at keys: five times leave room for that. Quadratic it took a thousand times as long.
+TEST_F(SceneFiles, TakeTimeInProportionToTheText)
+{
+    std::string text = "[{}";
+    for (int i = 1; i < 300000; ++i) text += ",{}";
+    const std::filesystem::path path = write("scene.json", text += "]");
+    const auto seconds = [&](const auto& read) {
+        double least = 1e9;
+        for (int run = 0; run < 3; ++run) {
+            const auto begin = std::chrono::steady_clock::now();
+            EXPECT_EQ(read().size(), 300000u);
+            least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+        }
+        return least;
+    };
+    EXPECT_LT(seconds([&] { return client::load_scene_file(path).scene; }), 5 * seconds([&] { return Json::parse(client::file_bytes(path)); }));
 }
 
 } // namespace

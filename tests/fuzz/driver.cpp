@@ -215,7 +215,12 @@ void run(const Input& input, const std::string& name, const std::string& path)
 
     static const std::int64_t before = peak_bytes();
     limit_time(most_cpu_s);
-    LLVMFuzzerTestOneInput(exact.get(), input.size());
+    try {
+        LLVMFuzzerTestOneInput(exact.get(), input.size());
+    } catch (const std::exception& error) {
+        // Here, where the input still is: it is written out by what handles the abort.
+        penumbra::fuzz::fail(std::string("an exception that is no penumbra::Error: ") + error.what());
+    }
     limit_time(0);
 
     std::fflush(nullptr);
@@ -298,8 +303,7 @@ int main(int count, char** values)
         run_all(arguments_from(count, values));
         return 0;
     } catch (const std::exception& error) {
-        // Before anything ran; an exception that leaves a target is one that it did not promise, and ends in abort, with the input kept.
-        if (failure.messages >= 0) penumbra::fuzz::fail(std::string("an exception that is no penumbra::Error: ") + error.what());
+        if (failure.messages >= 0) ::dup2(failure.messages, STDERR_FILENO);
         std::fprintf(stderr, "fuzz: %s\n\n%s", error.what(), usage);
         return 2;
     }

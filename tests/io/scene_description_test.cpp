@@ -314,6 +314,11 @@ Ends ends_of(const description::Files& files)
     return ends;
 }
 
+Ends ends_of(const description::FileTable&)
+{
+    return {{Json::object(), {{"a b.bin", "depth.exr"}}}, {1, "depth.exr", Json::array({"depth.exr"}), nullptr}};
+}
+
 template <class Other> Ends ends_of(const Other&) { return {}; }
 
 } // namespace
@@ -356,6 +361,7 @@ TEST(SceneDescription, FilesStandWhereTheDescriptionSays)
                                             "lights[].occluders.depth.back",
                                             "lights[].occluders.depth.layers[]",
                                             "objects[].mesh",
+                                            "objects[].files{}",
                                             "objects[].depth",
                                             "objects[].position",
                                             "occluders.depth.front",

@@ -34,6 +34,8 @@ TEST(SceneErrors, Json)
         {"[]", "expected an object", "", true},
         {"1", "expected an object", "", true},
         {"\xff\xfe", "is not JSON", "", true},
+        {std::string("{}\0{}", 5), "is not JSON", "byte 3 is 0", true},
+        {std::string("{\"penumbra\": 1}\0", 16), "is not JSON", "byte 16 is 0", true},
         {rectangle + ", " + quad + ", " + rectangle, "\"light\" stands twice"},
         {R"("light": {"kind": "point", "center": [0, 1, 0], "center": [0, 2, 0]}, )" + quad, "\"center\" stands twice"},
         {std::string(100, '['), "nested deeper than 32", "", true},

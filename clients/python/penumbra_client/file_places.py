@@ -1,6 +1,6 @@
 """Made by `penumbra_describe_scene --python` from the description of the scene file."""
 
-# Where a scene names files; [] is each element of a list.
+# Where a scene names files; [] is each element of a list, {} each member of a table.
 FILE_PLACES = (
     "light.emission",
     "light.emission[]",
@@ -10,6 +10,7 @@ FILE_PLACES = (
     "lights[].occluders.depth.back",
     "lights[].occluders.depth.layers[]",
     "objects[].mesh",
+    "objects[].files{}",
     "objects[].depth",
     "objects[].position",
     "occluders.depth.front",

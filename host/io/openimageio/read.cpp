@@ -1,6 +1,7 @@
 // Images from bytes, through OpenImageIO 2.4. What it promises little about is checked here: sizes before any sample is decoded, one named
 // reader and no other, kinds of TIFF that its reader is known to trip over, and errors that come with a "true" (TIFF).
 #include "io/openimageio/module.hpp"
+#include "scene/memory.hpp"
 
 #include <algorithm>
 #include <array>
@@ -62,6 +63,8 @@ public:
         if (std::max(pixels, tile) > max_samples / static_cast<std::uint64_t>(s.nchannels))
             throw Error(ErrorCode::too_large, std::string(where_) + " is " + size_text() + " x " + std::to_string(s.nchannels) +
                                                   " samples; the limit is " + std::to_string(max_samples));
+        // OpenImageIO's copy of all channels, the picked ones as float and as they are stored.
+        require_memory(static_cast<double>(std::max(pixels, tile)) * s.nchannels * 12, where_);
         if (const int turned = s.get_int_attribute("Orientation", 1); turned != 1)
             throw broken(where_, "is stored turned (orientation " + std::to_string(turned) + "), expected row 0 at the top",
                          "turn its pixels first");

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -9,6 +11,7 @@
 
 #include <fcntl.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -48,13 +51,31 @@ bool can_open(const fs::path& path, int flags)
 
 TEST_F(Confinement, FilesElsewhereAreClosed)
 {
-    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 0) GTEST_SKIP() << "this kernel has no Landlock";
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 2) GTEST_SKIP() << "this kernel has no Landlock";
     EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "secret", O_RDONLY));
     EXPECT_IN_CHILD(closed() && !can_open(folder / "shut" / "new", O_WRONLY | O_CREAT));
     EXPECT_IN_CHILD(closed() && !can_open("/etc/passwd", O_RDONLY));
     EXPECT_IN_CHILD(closed() && can_open(folder / "open" / "new", O_RDWR | O_CREAT));
     EXPECT_IN_CHILD(closed() && can_open("/usr/bin/env", O_RDONLY) && !can_open("/usr/new", O_WRONLY | O_CREAT));
     EXPECT_IN_CHILD(closed() && can_open("/dev/null", O_WRONLY));
+}
+
+// As PoCL does with what it has linked.
+TEST_F(Confinement, FilesMoveWithinWhatIsOpen)
+{
+    fs::create_directories(folder / "open" / "kernels");
+    std::ofstream(folder / "open" / "new") << "library";
+    EXPECT_IN_CHILD((closed(), std::rename((folder / "open" / "new").c_str(), (folder / "open" / "kernels" / "library").c_str()) == 0));
+    std::ofstream(folder / "open" / "mine") << "text";
+    EXPECT_IN_CHILD((closed(), std::rename((folder / "open" / "mine").c_str(), (folder / "open" / "yours").c_str()) == 0));
+}
+
+TEST_F(Confinement, FilesElsewhereKeepTheirLength)
+{
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 3) GTEST_SKIP() << "this kernel's Landlock does not know truncation";
+    EXPECT_IN_CHILD(closed() && ::truncate((folder / "shut" / "secret").c_str(), 0) != 0 && errno == EACCES);
+    std::ofstream(folder / "open" / "mine") << "text";
+    EXPECT_IN_CHILD(closed() && ::truncate((folder / "open" / "mine").c_str(), 0) == 0);
 }
 
 TEST_F(Confinement, SocketsAndTracingAreRefused)
@@ -64,6 +85,27 @@ TEST_F(Confinement, SocketsAndTracingAreRefused)
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_NETLINK, SOCK_RAW, 0) < 0 && errno == EPERM);
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0);
     EXPECT_IN_CHILD(server::close_calls() && ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) < 0 && errno == EPERM);
+}
+
+TEST_F(Confinement, OtherProcessesAreOutOfReach)
+{
+    const pid_t parent = getpid();
+    EXPECT_IN_CHILD(server::close_calls() && kill(parent, 0) < 0 && errno == EPERM && kill(getpid(), 0) == 0);
+    EXPECT_IN_CHILD(server::close_calls() && syscall(SYS_tgkill, parent, parent, 0) < 0 && errno == EPERM);
+    rlimit limit{};
+    EXPECT_IN_CHILD(server::close_calls() && prlimit(parent, RLIMIT_NOFILE, nullptr, &limit) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && getrlimit(RLIMIT_NOFILE, &limit) == 0);
+    EXPECT_IN_CHILD(server::close_calls() && setpriority(PRIO_PROCESS, static_cast<id_t>(parent), 19) < 0 && errno == EPERM);
+    EXPECT_EXIT((server::close_calls(), std::abort()), testing::KilledBySignal(SIGABRT), "");
+}
+
+TEST_F(Confinement, NoWayAroundTheFilter)
+{
+    EXPECT_IN_CHILD(server::close_calls() && syscall(SYS_io_uring_setup, 1, nullptr) < 0 && errno == EPERM);
+#if defined(__x86_64__)
+    constexpr long x32 = 0x40000000;
+    EXPECT_IN_CHILD(server::close_calls() && syscall(x32 | SYS_socket, AF_INET, SOCK_STREAM, 0) < 0 && errno == EPERM);
+#endif
 }
 
 TEST_F(Confinement, MemoryIsLimited)

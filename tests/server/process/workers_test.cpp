@@ -205,6 +205,20 @@ TEST(Workers, KilledAtRandomTheyLoseTheirOwnRequests)
     for (const auto& [mine, mask] : masks) EXPECT_EQ(ask(running.port, request_number(mine)).body, mask);
 }
 
+// Which request comes next has nothing to do with it.
+TEST(Workers, OneThatDiesIdleCostsNothing)
+{
+    Running running{options_with(60, 1)};
+    for (int i = 0; i < 3; ++i) {
+        wait_for_idle(running.port, 1);
+        const auto process = running.service().workers().processes().front();
+        kill(process, SIGKILL);
+        siginfo_t facts{};
+        ASSERT_EQ(waitid(P_PID, static_cast<id_t>(process), &facts, WEXITED | WNOWAIT), 0); // that it is gone, and its channel with it
+        EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+    }
+}
+
 TEST(Workers, ScenesThatTheyKeepSurviveThem)
 {
     Running running{options_with(60, 1)};

@@ -6,8 +6,8 @@
 
 namespace penumbra::client::detail {
 
-// Where a scene names files; [] is each element of a list.
-inline constexpr std::array<std::string_view, 15> file_places{
+// Where a scene names files; [] is each element of a list, {} each member of a table.
+inline constexpr std::array<std::string_view, 16> file_places{
     "light.emission",
     "light.emission[]",
     "lights[].emission",
@@ -16,6 +16,7 @@ inline constexpr std::array<std::string_view, 15> file_places{
     "lights[].occluders.depth.back",
     "lights[].occluders.depth.layers[]",
     "objects[].mesh",
+    "objects[].files{}",
     "objects[].depth",
     "objects[].position",
     "occluders.depth.front",

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -14,6 +13,9 @@
 
 #include <penumbra/client/file_places.hpp>
 #include <penumbra/client/images.hpp>
+#include <penumbra/client/json_document.hpp>
+#include <penumbra/client/mesh_files.hpp>
+#include <penumbra/client/parts.hpp>
 
 namespace penumbra::client {
 
@@ -29,12 +31,12 @@ inline void find_files(nlohmann::json& value, std::string_view place, std::vecto
 {
     if (place.empty()) {
         if (value.is_string()) found.push_back(&value);
-    } else if (place.starts_with("[]")) {
-        place.remove_prefix(place.starts_with("[].") ? 3 : 2);
-        if (!value.is_array()) return;
+    } else if (place.starts_with("[]") || place.starts_with("{}")) {
+        if (place.starts_with('[') ? !value.is_array() : !value.is_object()) return;
+        place.remove_prefix(place.substr(2).starts_with('.') ? 3 : 2);
         for (nlohmann::json& element : value) find_files(element, place, found);
     } else {
-        const std::size_t end = std::min(place.find_first_of(".["), place.size());
+        const std::size_t end = std::min(place.find_first_of(".[{"), place.size());
         const auto member = value.is_object() ? value.find(std::string(place.substr(0, end))) : value.end();
         if (member == value.end()) return;
         place.remove_prefix(end);
@@ -43,63 +45,30 @@ inline void find_files(nlohmann::json& value, std::string_view place, std::vecto
     }
 }
 
-// A name for a part that is not taken: the file's own, with what the service does not allow replaced by _. At most 120 characters, so that
-// a number still fits into the 128 that the service allows; the end stays, as it decides a mesh's format.
-inline std::string free_name(const std::filesystem::path& file, const Images& taken)
-{
-    std::string base = file.filename().string();
-    for (char& c : base)
-        if (!is_part_name(std::string("a") + c)) c = '_';
-    if (base.size() > 120) base.erase(0, base.size() - 120);
-    base.erase(0, base.find_first_not_of('.'));
-    if (base.empty()) base = "image";
-    const std::filesystem::path name(base);
-    for (int number = 2; taken.contains(base) || base == "scene"; ++number)
-        base = name.stem().string() + "-" + std::to_string(number) + name.extension().string();
-    return base;
-}
-
 } // namespace detail
 
 // Reads every file that the scene names, relative to `folder`, and renames them in the scene to what they are called in the request: their
-// last component; of two files that would get one name, the second becomes name-2.exr. A mesh is one file: companions of glTF (.bin) and
-// OBJ (.mtl) do not travel. Throws std::system_error naming the file.
+// last component; of two files that would get one name, the second becomes name-2.exr. The files that meshes name (OBJ's .mtl and what that
+// cuts out with, glTF's .bin and cut-outs) go with them; where their parts have other names the mesh's `files` says so. Throws
+// std::system_error naming the file.
 inline Images take_files(nlohmann::json& scene, const std::filesystem::path& folder)
 {
-    Images images;
-    std::map<std::string, std::string> names; // by the file's real path
+    detail::Parts parts;
+    const std::vector<detail::MeshObject> meshes = detail::meshes_of(scene, folder);
     std::vector<nlohmann::json*> found;
     for (const std::string_view place : detail::file_places) detail::find_files(scene, place, found);
-    for (nlohmann::json* value : found) {
-        const std::filesystem::path file = folder / value->get<std::string>();
-        std::error_code ignored;
-        std::string& name = names[std::filesystem::weakly_canonical(file, ignored).string()];
-        if (name.empty()) {
-            std::string bytes = file_bytes(file);
-            name = detail::free_name(file, images);
-            images.emplace(name, std::move(bytes));
-        }
-        *value = name;
-    }
-    return images;
+    for (nlohmann::json* value : found) *value = parts.part_of(folder / value->get<std::string>());
+    detail::add_mesh_files(meshes, parts);
+    return parts.take();
 }
 
 // Throws std::invalid_argument for what is not JSON or has a key twice in one object, std::system_error for files that cannot be read.
 inline SceneFile load_scene_file(const std::filesystem::path& path)
 {
-    std::vector<std::set<std::string>> open; // keys of the objects around the value that is read
-    const auto unique = [&](int, nlohmann::json::parse_event_t event, nlohmann::json& value) {
-        using Event = nlohmann::json::parse_event_t;
-        if (event == Event::object_start) open.emplace_back();
-        if (event == Event::object_end) open.pop_back();
-        if (event == Event::key && !open.back().insert(value.get<std::string>()).second)
-            throw std::invalid_argument(path.string() + ": the key " + value.dump() + " stands twice in one object");
-        return true;
-    };
     SceneFile file;
     try {
-        file.scene = nlohmann::json::parse(file_bytes(path), unique);
-    } catch (const nlohmann::json::exception& error) {
+        file.scene = detail::json_document(file_bytes(path));
+    } catch (const std::invalid_argument& error) {
         throw std::invalid_argument(path.string() + ": " + error.what());
     }
     file.images = take_files(file.scene, path.parent_path());
