@@ -256,14 +256,14 @@ Ends ends_of(const description::Number& range)
     // Inside an open end, in place of the smallest double: a value whose tangent, too, is no 0.
     constexpr double little = 1e-300;
     Ends ends;
-    if (std::isfinite(range.low)) {
+    // The largest number of all goes with no other key: that it is refused beyond says the range.
+    if (range.low > -description::largest) {
         ends.inside.push_back(range.above_low ? range.low + little : range.low);
         ends.outside.push_back(range.above_low ? range.low : std::nextafter(range.low, -INFINITY));
     }
-    if (std::isfinite(range.high)) {
-        ends.inside.push_back(range.below_high ? std::nextafter(range.high, 0) : range.high);
-        ends.outside.push_back(range.below_high ? range.high : std::nextafter(range.high, INFINITY));
-    }
+    if (range.high < description::largest) ends.inside.push_back(range.below_high ? std::nextafter(range.high, 0) : range.high);
+    ends.outside.push_back(range.below_high ? range.high : std::nextafter(range.high, INFINITY));
+    ends.outside.push_back(std::nextafter(-description::largest, -INFINITY));
     ends.outside.push_back("1");
     ends.outside.push_back(nullptr);
     return ends;
