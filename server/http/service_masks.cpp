@@ -63,8 +63,8 @@ Room::Hold Service::room_for(std::size_t bytes)
 {
     if (bytes > uploads_.size())
         throw Problem(413, "memory",
-                      "the body has " + std::to_string(bytes) + " bytes; all bodies and kept scenes together may take " + std::to_string(uploads_.size()) +
-                          " of memory");
+                      "the body has " + std::to_string(bytes) + " bytes; all bodies and kept scenes together may take " +
+                          std::to_string(uploads_.size()) + " of memory");
     for (;;) {
         if (std::optional<Room::Hold> hold = uploads_.take(bytes)) return std::move(*hold);
         if (!scenes_.forget_one())
