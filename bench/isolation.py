@@ -41,7 +41,7 @@ CASES = {
 def run(service, name, requests):
     scene, accept = CASES[name]
     data = post("/v1/masks", form(*scene), accept)
-    totals, stages, uploads, rests = [], [], [], []
+    totals, stages, uploads, handing, rests = [], [], [], [], []
     for number in range(requests + 20):
         begun = time.perf_counter()
         answer = service.send(data)
@@ -52,15 +52,15 @@ def run(service, name, requests):
         if number < 20:
             continue
         inside = line["decode_ms"] + line["compute_ms"] + line["encode_ms"]
-        for values, value in [(totals, total), (stages, inside), (uploads, line["upload_ms"]), (rests, total - inside)]:
+        for values, value in [(totals, total), (stages, inside), (uploads, line["upload_ms"]), (handing, line["worker_ms"] - inside), (rests, total - inside)]:
             values.append(value)
-    print(f"| {name} | " + " | ".join(f"{statistics.median(values):.2f}" for values in (totals, stages, uploads, rests)) + f" | {min(rests):.2f} |", flush=True)
+    print(f"| {name} | " + " | ".join(f"{statistics.median(values):.2f}" for values in (totals, stages, handing, uploads, rests)) + f" | {min(rests):.2f} |", flush=True)
 
 
 def main():
     program = sys.argv[1] if len(sys.argv) > 1 else str(root / "build" / "release" / "server" / "penumbra-server")
     requests = int(sys.argv[2]) if len(sys.argv) > 2 else 200
-    print("| | total, ms: median | decode, compute, encode | upload | all beside the stages | least |\n| --- | --- | --- | --- | --- | --- |")
+    print("| | total, ms: median | decode, compute, encode | to the worker and back | upload | all beside the stages | least |\n| --- | --- | --- | --- | --- | --- | --- |")
     with Service(program) as service:
         for name in CASES:
             run(service, name, requests)

@@ -84,6 +84,7 @@ CLI::App* add_verb(CLI::App& program, const char* name, const char* verb_summary
 {
     CLI::App* app = program.add_subcommand(name, verb_summary)->group("Verbs");
     app->formatter(std::make_shared<VerbHelp>(usage));
+    // C++20 makes an array of a number, so that add_flag would not know a description by itself from a count.
     app->add_flag("--isolate")->description("work in a process of its own: a file that crashes a reader costs this command alone, with one clear line");
     return app;
 }

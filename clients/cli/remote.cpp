@@ -111,7 +111,7 @@ nlohmann::ordered_json report_of(const client::Mask& mask, const client::Client&
     return report;
 }
 
-// A connection that broke may have been one the service gave up as it ended or was full: asked once more. To ask for a mask changes nothing.
+// A connection that broke may have been one that the service gave up as it ended: asked once more. To ask for a mask changes nothing.
 client::Mask mask_of(const client::Client& service, const client::SceneFile& scene, const client::MaskOptions& options)
 {
     try {
@@ -129,7 +129,8 @@ nlohmann::ordered_json fetch(const client::Client& service, const client::SceneF
     // The bound first: a technique may have none.
     client::Mask bound;
     if (!file.bound.empty())
-        bound = mask_of(service, scene, {.format = client::Format::exr, .light = file.light, .frame = file.frame, .image = client::MaskImage::bound});
+        bound = mask_of(service, scene,
+                        {.format = client::Format::exr, .light = file.light, .frame = file.frame, .image = client::MaskImage::bound});
     const auto begun = std::chrono::steady_clock::now();
     const client::Mask mask = mask_of(service, scene, {.format = format_of_mask(file.file), .light = file.light, .frame = file.frame});
     const double round_trip_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count();

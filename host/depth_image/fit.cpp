@@ -216,7 +216,8 @@ DepthFit fit_depth(opencl::Work& work, const DepthMap& depth, const Camera& came
     fit.pixel_y = 2 * camera.half_extent.y / depth.height;
     const std::size_t count = depth.depth.size();
     // Its images, their copies on the device, and what is made of them after: 224 bytes a pixel were the most.
-    require_memory(230. * static_cast<double>(count), "fitting a depth image of " + std::to_string(depth.width) + " x " + std::to_string(depth.height));
+    require_memory(230. * static_cast<double>(count),
+                   "fitting a depth image of " + std::to_string(depth.width) + " x " + std::to_string(depth.height));
 
     // Values and where there is something.
     fit.there.assign(count, 0);

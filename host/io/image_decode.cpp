@@ -55,8 +55,7 @@ std::optional<PlainExr> plain_exr(std::span<const std::byte> exr, std::string_vi
 {
     check_exr_header(exr, where, max_samples);
     std::optional<PlainExr> file = PlainExr::open(exr);
-    if (file)
-        require_memory(8. * file->width() * file->height() * static_cast<double>(file->channels().size()), where);
+    if (file) require_memory(8. * file->width() * file->height() * static_cast<double>(file->channels().size()), where);
     if (file &&
         static_cast<std::uint64_t>(file->width()) * static_cast<std::uint64_t>(file->height()) > max_samples / file->channels().size())
         return {};

@@ -123,7 +123,8 @@ TriangleMesh mesh_of_texels(const DepthMap& map, const Camera& camera)
         throw Error(ErrorCode::too_large, "depth map: " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels",
                     "expected fewer than " + std::to_string(none / 4));
     // Vertices, their values, two triangles, and what vectors that grow hold for a moment.
-    require_memory(bytes_per_texel * static_cast<double>(map.depth.size()), "surfaces of a depth map of " + std::to_string(map.width) + " x " + std::to_string(map.height));
+    require_memory(bytes_per_texel * static_cast<double>(map.depth.size()),
+                   "surfaces of a depth map of " + std::to_string(map.width) + " x " + std::to_string(map.height));
     const Texels texels(map, camera.orthographic);
     TriangleMesh mesh;
 

@@ -5,8 +5,8 @@
 
 #include <penumbra/error.hpp>
 
-#include "scene/weld.hpp"
 #include "scene/memory.hpp"
+#include "scene/weld.hpp"
 #include "silhouette/edges.hpp"
 
 namespace penumbra {

@@ -102,8 +102,8 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
 // What of a part goes to the device.
 double bytes_of(const WedgeData& data)
 {
-    const std::size_t floats = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() + data.triangle_boxes.size() +
-                               data.triangle_extents.size() + data.triangles.size();
+    const std::size_t floats = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() +
+                               data.triangle_boxes.size() + data.triangle_extents.size() + data.triangles.size();
     return static_cast<double>(floats) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
 }
 

@@ -26,6 +26,7 @@ struct RequestCost {
     std::string technique;
     std::uint64_t bytes_in = 0;
     double upload_ms = 0, queue_ms = 0, decode_ms = 0, compute_ms = 0, encode_ms = 0;
+    double worker_ms = 0; // from the call to a worker to its answer's bytes: the last three, and what handing over takes
 };
 
 class Connection final : public httplib::Stream {

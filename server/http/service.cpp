@@ -135,9 +135,9 @@ void Service::Http::begin(httplib::Request& request, Connection& connection)
 
 Service::Service(Options options, Log log, std::string program)
     : options_(std::move(options)), log_(std::move(log)),
-      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)), pool_(pool_of(options_, std::move(program)), log_),
-      greeting_(greeting_of(pool_)), device_(greeting_.device + "\n" + greeting_.driver),
-      uploads_(uploads_memory(options_)),
+      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)),
+      pool_(pool_of(options_, std::move(program)), log_), greeting_(greeting_of(pool_)),
+      device_(greeting_.device + "\n" + greeting_.driver), uploads_(uploads_memory(options_)),
       scenes_(static_cast<std::uint64_t>(options_.scenes_bytes), static_cast<std::size_t>(options_.scenes),
               std::chrono::seconds(options_.scenes_s)),
       id_prefix_(random_prefix()), started_s_(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),

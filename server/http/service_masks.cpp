@@ -63,8 +63,8 @@ Room::Hold Service::room_for(std::size_t bytes)
 {
     if (bytes > uploads_.size())
         throw Problem(413, "memory",
-                      "the body has " + std::to_string(bytes) + " bytes; all bodies and kept scenes together may take " + std::to_string(uploads_.size()) +
-                          " of memory");
+                      "the body has " + std::to_string(bytes) + " bytes; all bodies and kept scenes together may take " +
+                          std::to_string(uploads_.size()) + " of memory");
     for (;;) {
         if (std::optional<Room::Hold> hold = uploads_.take(bytes)) return std::move(*hold);
         if (!scenes_.forget_one())
@@ -113,6 +113,7 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
 {
     const Deadline& deadline = Connection::current().request();
     if (crashes_.any()) crashes_.check(digest());
+    const auto calling = Deadline::Clock::now();
     auto worker = pool_.lease(call.id, deadline);
     Call timed = call;
     timed.seconds = std::max(std::chrono::duration<double>(deadline.end() - Deadline::Clock::now()).count(), 0.0);
@@ -129,6 +130,7 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
     if (!call.id.empty()) worker.keeps(call.id);
     if (crashes_.any()) crashes_.absolve(digest());
     CallReply answer = reply_from(message.text);
+    Connection::current().cost.worker_ms = seconds_since(calling) * 1000;
     if (!answer.problem) return answer;
     Connection::current().inside = answer.inside;
     throw *answer.problem;
@@ -258,7 +260,9 @@ void Service::send_mask(Response& response, CallReply answer, const Message& mes
     response.status = 200;
     response.set_header("Server-Timing", server_timing(reply.stages));
     if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
+    const auto copying = Deadline::Clock::now();
     response.body = copy_of(message.files.front());
+    cost.worker_ms += seconds_since(copying) * 1000;
     response.set_header("Content-Type", std::string(format.media_type));
 }
 

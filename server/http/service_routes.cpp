@@ -169,7 +169,8 @@ void Service::finished(const Request& request, const Response& response)
                      {"queue_ms", cost.queue_ms},
                      {"decode_ms", cost.decode_ms},
                      {"compute_ms", cost.compute_ms},
-                     {"encode_ms", cost.encode_ms}});
+                     {"encode_ms", cost.encode_ms},
+                     {"worker_ms", cost.worker_ms}});
     if (!connection.reason.empty()) line["reason"] = connection.reason;
     if (!connection.inside.empty() && response.status >= 500) line["inside"] = connection.inside;
     log_(line.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));

@@ -43,8 +43,8 @@ class Worker {
 public:
     Worker(const Options& options, const Engine& engine)
         : options_(options), engine_(engine),
-          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), worker_memory(options) / 4), static_cast<std::size_t>(options.scenes),
-                  std::chrono::seconds(options.scenes_s))
+          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), worker_memory(options) / 4),
+                  static_cast<std::size_t>(options.scenes), std::chrono::seconds(options.scenes_s))
     {
     }
 
@@ -249,7 +249,8 @@ int work(const Options& options, const std::string& temporary, Channel channel)
             continue;
         }
         Descriptor bytes;
-        const CallReply answer = guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
+        const CallReply answer =
+            guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
         const int file = bytes.get();
         if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
     }

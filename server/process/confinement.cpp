@@ -89,8 +89,10 @@ void allow_with(std::vector<sock_filter>& program, long call, int argument, cons
 {
     const auto count = static_cast<std::uint8_t>(values.size());
     program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, static_cast<std::uint8_t>(count + 3)));
-    program.push_back(step(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offsetof(seccomp_data, args) + 8 * static_cast<std::size_t>(argument))));
-    for (std::uint8_t i = 0; i < count; ++i) program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, values[i], static_cast<std::uint8_t>(count - i), 0));
+    program.push_back(
+        step(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offsetof(seccomp_data, args) + 8 * static_cast<std::size_t>(argument))));
+    for (std::uint8_t i = 0; i < count; ++i)
+        program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, values[i], static_cast<std::uint8_t>(count - i), 0));
     program.push_back(step(BPF_RET | BPF_K, refused));
     program.push_back(step(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
 }
@@ -156,9 +158,9 @@ bool close_files(const OpenFolders& folders)
 
 bool close_calls()
 {
-    constexpr std::array closed{SYS_ptrace,       SYS_process_vm_readv, SYS_process_vm_writev, SYS_mount,      SYS_umount2,      SYS_pivot_root,
-                                SYS_bpf,          SYS_perf_event_open,  SYS_init_module,       SYS_finit_module, SYS_delete_module, SYS_kexec_load,
-                                SYS_add_key,      SYS_request_key,      SYS_keyctl,            SYS_userfaultfd, SYS_setns,        SYS_unshare,
+    constexpr std::array closed{SYS_ptrace, SYS_process_vm_readv, SYS_process_vm_writev, SYS_mount, SYS_umount2, SYS_pivot_root, SYS_bpf,
+                                SYS_perf_event_open, SYS_init_module, SYS_finit_module, SYS_delete_module, SYS_kexec_load, SYS_add_key,
+                                SYS_request_key, SYS_keyctl, SYS_userfaultfd, SYS_setns, SYS_unshare,
                                 // Queues of calls, sockets among them, that this filter does not see; other processes.
                                 SYS_io_uring_setup, SYS_io_uring_enter, SYS_io_uring_register, SYS_pidfd_getfd, SYS_pidfd_send_signal,
                                 SYS_process_madvise, SYS_tkill, SYS_rt_sigqueueinfo, SYS_rt_tgsigqueueinfo, SYS_setpriority};

@@ -33,7 +33,9 @@ Problem out_of_memory() { return Problem(503, "memory", "this takes more memory 
 
 Problem out_of_memory(std::uint64_t bytes)
 {
-    return Problem(413, "memory", "this takes more memory than the " + std::to_string(bytes >> 20) + " MiB that a request may use; send smaller images, or fewer");
+    return Problem(413, "memory",
+                   "this takes more memory than the " + std::to_string(bytes >> 20) +
+                       " MiB that a request may use; send smaller images, or fewer");
 }
 
 Problem service_ends() { return Problem(503, "ending", "the service is about to end, and this takes longer than it waits; try again", 5); }

@@ -42,7 +42,8 @@ SharedBytes::SharedBytes(std::size_t size, Room::Hold hold) : hold_(std::move(ho
 SharedBytes::SharedBytes(Descriptor file) : file_(std::move(file)), size_(size_of(file_)) { bytes_ = mapped(file_, size_, PROT_READ); }
 
 SharedBytes::SharedBytes(SharedBytes&& other) noexcept
-    : hold_(std::move(other.hold_)), file_(std::move(other.file_)), bytes_(std::exchange(other.bytes_, nullptr)), size_(std::exchange(other.size_, 0))
+    : hold_(std::move(other.hold_)), file_(std::move(other.file_)), bytes_(std::exchange(other.bytes_, nullptr)),
+      size_(std::exchange(other.size_, 0))
 {
 }
 

@@ -86,7 +86,7 @@ def main():
     arguments.add_argument("--first", type=int, default=0)
     arguments.add_argument("--seed", type=int, default=1)
     options = arguments.parse_args()
-    counts, failures, begun = collections.Counter(), [], time.monotonic()
+    counts, failures, late, begun = collections.Counter(), [], [], time.monotonic()
     with Service(options.server, "--deadline-s", DEADLINE) as service, concurrent.futures.ThreadPoolExecutor(2) as clients:
         techniques = json.loads(service.get("/v1/techniques").body)["techniques"]
 
@@ -100,13 +100,15 @@ def main():
         for number, results in clients.map(one, numbers):
             for status, wrong in results:
                 counts[status] += 1
+                if status == 504:
+                    late.append(number)
                 if wrong:
                     failures.append(number)
                     print(f"extremes: --seed {options.seed} --first {number} --count 1: {wrong}", file=sys.stderr, flush=True)
         crashed, overdue = (int(service.metric(f"penumbra_workers_{what}_total")) for what in ("crashed", "overdue"))
     seconds = time.monotonic() - begun
     print(f"{options.count} scenes from {options.first} of seed {options.seed}, {sum(counts.values())} answers in {seconds:.0f} s: "
-          + ", ".join(f"{count} times {status}" for status, count in sorted(counts.items())) + f"; {crashed} workers crashed, {overdue} were overdue")
+          + ", ".join(f"{count} times {status}" for status, count in sorted(counts.items())) + f"; {crashed} workers crashed, {overdue} were overdue" + (f"; over the {DEADLINE} s: {late[:20]}" if late else ""))
     if not counts[200] or service.code != 0:
         print(f"extremes: {counts[200]} masks, exit code {service.code}", file=sys.stderr)
         return 1

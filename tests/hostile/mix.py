@@ -158,7 +158,7 @@ def main():
     options = arguments.parse_args()
     wrong, expected = [], {}
     print("| time | honest requests | answers | ms: median | 99 % | MiB, at most |\n| --- | --- | --- | --- | --- | --- |", flush=True)
-    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 5, "--rays", 1 << 40, "--slots", 3) as service:
+    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 15, "--rays", 1 << 40, "--slots", 3) as service:
         for name, data in honest_requests().items():
             expected[name] = service.send(data).body
         quiet, _ = measured(service, "quiet", options.seconds / 6, 2, expected, wrong)
