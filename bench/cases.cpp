@@ -23,9 +23,9 @@ void both_versions(const Engine& engine, const char* bench, Occluder occluder, c
 {
     const Scene scene = paper_scene(occluder, options);
     const Image reference = reference_of(engine, scene, sweep_samples);
-    emit(measure(engine, scene, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front}, reference, runs), bench, occluder, parameter);
+    emit(measure(engine, scene, SoftShadowMap{.sides = Sides::front}, reference, runs), bench, occluder, parameter);
     if (occluder != Occluder::square)
-        emit(measure(engine, scene, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::both}, reference, runs), bench, occluder, parameter);
+        emit(measure(engine, scene, SoftShadowMap{.sides = Sides::both}, reference, runs), bench, occluder, parameter);
 }
 
 } // namespace
@@ -37,11 +37,11 @@ void bunny(const Engine& engine)
     for (const int texels : {64, 128, 256, 512})
         for (const Sides sides : {Sides::front, Sides::back, Sides::both}) {
             const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = texels});
-            emit(measure(engine, at, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = sides}, reference, 15), "bunny", Occluder::bunny, texels);
+            emit(measure(engine, at, SoftShadowMap{.sides = sides}, reference, 15), "bunny", Occluder::bunny, texels);
         }
     for (const int texels : {64, 128, 256, 512}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = texels});
-        for (const Sides sides : {Sides::front, Sides::both}) emit(measure(engine, at, SoftShadowMap{.sides = sides}, reference, 15), "bunny", Occluder::bunny, texels);
+        for (const Sides sides : {Sides::front, Sides::both}) emit(measure(engine, at, SoftShadowMap{.visibility = PatchVisibility::united, .sides = sides}, reference, 15), "bunny", Occluder::bunny, texels);
     }
     for (const bool adaptive : {false, true})
         for (const int samples : {16, 64, 256, 1024}) {
@@ -72,7 +72,7 @@ void light_size(const Engine& engine)
              {std::pair{64, "light_size_64"}, {128, "light_size_128"}, {256, "light_size_256"}, {512, "light_size_512"}}) {
             const Scene scene =
                 paper_scene(Occluder::bunny, {.light_side = side, .occluder_resolution = texels, .receiver_resolution = 256});
-            emit(measure(engine, scene, SoftShadowMap{.visibility = PatchVisibility::sum}, reference, 3), bench, Occluder::bunny, side);
+            emit(measure(engine, scene, SoftShadowMap{}, reference, 3), bench, Occluder::bunny, side);
         }
     }
 }
@@ -99,7 +99,7 @@ void texels(const Engine& engine)
     for (const int side : {32, 64, 96, 128, 192, 256, 384, 512, 768, 1024}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = side});
         for (const Sides sides : {Sides::front, Sides::both})
-            emit(measure(engine, at, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = sides}, reference, 5), "texels", Occluder::bunny,
+            emit(measure(engine, at, SoftShadowMap{.sides = sides}, reference, 5), "texels", Occluder::bunny,
                  static_cast<double>(side) * side);
     }
 }
@@ -111,7 +111,7 @@ void accumulators(const Engine& engine)
     for (const int side : {64, 128, 256, 512, 1024}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = side});
         for (const Accumulator accumulator : {Accumulator::binary16, Accumulator::binary32, Accumulator::compensated})
-            emit(measure(engine, at, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front, .accumulator = accumulator}, reference, 5), "accumulators",
+            emit(measure(engine, at, SoftShadowMap{.sides = Sides::front, .accumulator = accumulator}, reference, 5), "accumulators",
                  Occluder::bunny, side);
     }
 }
@@ -132,7 +132,7 @@ void large(const Engine& engine)
     const SceneOptions options{.light_side = 0.2, .occluder_resolution = 2048, .receiver_resolution = 4096};
     const Scene scene = paper_scene(Occluder::bunny, options);
     const Image reference = reference_of(engine, scene, 64);
-    emit(measure(engine, scene, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front}, reference, 1), "large", Occluder::bunny, 4096);
+    emit(measure(engine, scene, SoftShadowMap{.sides = Sides::front}, reference, 1), "large", Occluder::bunny, 4096);
 }
 
 } // namespace penumbra::bench

@@ -1,8 +1,9 @@
 // Soft Shadow Maps with a union: which of 32 x 32 samples of the light the micro-patches of one or two occluder maps hide, a bit each.
 //
 // Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. The samples are the
-// same for every receiver: (i, k) lies at u = (i + r(k)) / 32, v = (k + r(i)) / 32, r(j) = (j with its five bits reversed + 1/2) / 32, so that an edge
-// of any direction is resolved to about 1/1024 of the light, and the mask has no noise.
+// same for every receiver, so that the mask has no noise: (i, k) lies at u = (i + r(k)) / 32, v = (k + q(i)) / 32, with r(k) = (j + 1/2) / 32 and
+// q(i) = ((19 j + 25) mod 32 + 1/2) / 32, j being the number with its five bits reversed. A straight edge of any direction is resolved to 7/1024 at the
+// worst, 4/1024 on average, along an axis to 1/1024. (With r for q, places mirrored at the diagonal coincide, and an edge along it is off by 16/1024.)
 //
 // Specialisation constants: LANES, ITEM_ROWS, TILE_ROWS as in soft_shadow_map.cl
 #include "common/choices.h"
@@ -102,11 +103,11 @@ __kernel void micro_patches(const int2 size, const float precision, const int ha
 
 // --- Bits -----------------
 
-// Columns i with r(i) below m / 32 less half a step: the first m in the order of their reversed bits.
+// Columns i with q(i) below m / 32 less half a step: the first m in the order of (19 j + 25) mod 32, j being i with its bits reversed.
 __constant uint columns_below[SIDE + 1] = {
-    0x00000000u, 0x00000001u, 0x00010001u, 0x00010101u, 0x01010101u, 0x01010111u, 0x01110111u, 0x01111111u, 0x11111111u, 0x11111115u, 0x11151115u,
-    0x11151515u, 0x15151515u, 0x15151555u, 0x15551555u, 0x15555555u, 0x55555555u, 0x55555557u, 0x55575557u, 0x55575757u, 0x57575757u, 0x57575777u,
-    0x57775777u, 0x57777777u, 0x77777777u, 0x7777777fu, 0x777f777fu, 0x777f7f7fu, 0x7f7f7f7fu, 0x7f7f7fffu, 0x7fff7fffu, 0x7fffffffu, 0xffffffffu};
+    0x00000000u, 0x00800000u, 0x00800008u, 0x02800008u, 0x02804008u, 0x02844008u, 0x02844018u, 0x82844018u, 0x82844818u, 0x82a44818u, 0x82a4481au,
+    0x86a4481au, 0x86a4581au, 0x86a5581au, 0x86a5589au, 0xa6a5589au, 0xa6a55a9au, 0xa6e55a9au, 0xa6e55a9eu, 0xa7e55a9eu, 0xa7e5da9eu, 0xa7edda9eu,
+    0xa7eddabeu, 0xe7eddabeu, 0xe7eddebeu, 0xe7fddebeu, 0xe7fddebfu, 0xeffddebfu, 0xeffdfebfu, 0xeffffebfu, 0xeffffeffu, 0xfffffeffu, 0xffffffffu};
 
 // r(k), the phase of a row's samples, of a column.
 __constant float phases[SIDE] = {

@@ -10,7 +10,7 @@ namespace {
 const std::vector<Technique> techniques = {
     SoftShadowMap{},
     SoftShadowMap{.sides = Sides::front, .resolution = 31},
-    SoftShadowMap{.visibility = PatchVisibility::sum},
+    SoftShadowMap{.visibility = PatchVisibility::united},
     SoftShadowMap{.visibility = PatchVisibility::sum, .accumulator = Accumulator::compensated},
     SoftShadowMap{.visibility = PatchVisibility::sum, .accumulator = Accumulator::binary16},
     ShadowMap{},

@@ -13,7 +13,7 @@ enum class PatchVisibility { sum, united };
 struct SoftShadowMap {
     // united (`union` in scene files): which of 32 x 32 samples of the light the patches of all maps hide, each once. sum: the paper's, the shares
     // added up, and of two maps the larger.
-    PatchVisibility visibility = PatchVisibility::united;
+    PatchVisibility visibility = PatchVisibility::sum;
     Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
     int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
     Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`, of sum; united takes the nearest texel
