@@ -790,7 +790,7 @@ class Away(PageTest):
         self.wait_for("return document.getElementById('outage').textContent === 'The service has no time: every place is taken; trying again in 3 s'")
         self.settled()
         self.assertEqual(self.outage(), "")
-        first, second = self.js("return window.asked")
+        first, second = self.js("return window.asked")[:2]  # the third may be on its way by now
         self.assertGreater(second - first, 2999)
         self.assertLess(second - first, 5000)
 
