@@ -172,11 +172,16 @@ TechniqueRow row(const SoftShadowMap&)
         .defaults = SoftShadowMap{}};
 }
 
-PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
+void check_together(const SoftShadowMap& settings)
 {
     if (settings.visibility == PatchVisibility::united && settings.accumulator != Accumulator::binary32)
         throw Error::at(ErrorCode::invalid_input, "technique.accumulator", "is " + std::string(accumulator_names[static_cast<std::size_t>(settings.accumulator)]) + " and visibility union",
                         "expected visibility sum: a union sums nothing up");
+}
+
+PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
+{
+    check_together(settings);
     const MapSize from{depth.width, depth.height};
     const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
     PreparedSoftShadowMap prepared{.settings = settings,

@@ -43,5 +43,6 @@ void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Rece
 std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& shape);
 std::vector<opencl::Specialisation> specialisations(const SoftShadowMap& settings, int lanes);
 DeviceBuffers device_buffers(const SoftShadowMap& settings);
+void check_together(const SoftShadowMap& settings);
 
 } // namespace penumbra
