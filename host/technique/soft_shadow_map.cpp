@@ -82,22 +82,30 @@ opencl::Specialisation program(const SoftShadowMap& settings, int lanes)
              choice_constant("ACCUMULATOR", accumulator_names, settings.accumulator)}};
 }
 
+// How a kernel's work-items share the receivers. On a GPU a tile is a work-group; on a CPU device a work-item, and groups of one keep the share of each
+// thread fine.
+struct Tiling {
+    std::array<std::size_t, 2> items, group;
+    std::uint64_t bytes; // of the receivers and their mask
+};
+Tiling tiling_of(opencl::Work& work, const ReceiverView& view)
+{
+    const int lanes = work.context().quirks().lanes;
+    const auto width = static_cast<std::size_t>(view.stride), height = static_cast<std::size_t>(view.rows);
+    return {.items = {width / static_cast<std::size_t>(lanes), height / static_cast<std::size_t>(item_rows(lanes))},
+            .group = lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1},
+            .bytes = width * height * 16};
+}
+
 // One pass over the receivers for one occluder map.
 void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const PreparedSoftShadowMap::Side& side, bool merge,
                 const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility,
                 const opencl::Buffer<cl_uint>& evaluated)
 {
-    const int device_lanes = work.context().quirks().lanes;
-    const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
+    const Tiling tiling = tiling_of(work, receivers.view);
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
-
-    // On a GPU a tile is a work-group; on a CPU device a work-item, and groups of one keep the share of each thread fine.
-    const auto lanes = static_cast<std::size_t>(device_lanes), rows = static_cast<std::size_t>(item_rows(device_lanes));
-    const std::array<std::size_t, 2> group =
-        lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
-    const std::uint64_t bytes = width * height * 16 + side.map.texels.bytes();
-    work.launch(prepared.program, "soft_shadow_map", {width / lanes, height / rows}, group, bytes, receivers.view, prepared.view,
+    work.launch(prepared.program, "soft_shadow_map", tiling.items, tiling.group, tiling.bytes + side.map.texels.bytes(), receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
                 side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }
@@ -106,12 +114,9 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
 void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds,
                  const cl::Buffer& visibility, const opencl::Buffer<cl_uint>& evaluated)
 {
-    const int device_lanes = work.context().quirks().lanes;
-    const auto width = static_cast<std::size_t>(receivers.view.stride), height = static_cast<std::size_t>(receivers.view.rows);
-    const auto lanes = static_cast<std::size_t>(device_lanes), rows = static_cast<std::size_t>(item_rows(device_lanes));
-    const std::array<std::size_t, 2> group = lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
+    const Tiling tiling = tiling_of(work, receivers.view);
     const PreparedSoftShadowMap::Side &first = prepared.sides.front(), &second = prepared.sides.back();
-    work.launch(prepared.program, "soft_shadow_union", {width / lanes, height / rows}, group, width * height * 16 + first.patches.bytes() * prepared.sides.size(),
+    work.launch(prepared.program, "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + first.patches.bytes() * prepared.sides.size(),
                 receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
                 static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), first.patches, second.patches,
                 first.map.texels, first.map.steps, second.map.texels, second.map.steps, first.blocks, first.superblocks, second.blocks, second.superblocks, bounds,

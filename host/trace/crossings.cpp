@@ -114,10 +114,8 @@ void find_crossings(const Tracer::Impl& scene, const ViewRay& ray, std::vector<C
     query.ray.tfar = std::numeric_limits<float>::infinity();
     query.ray.mask = ~0u;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    // What Embree would end the process for meets nothing.
     const RTCRay& r = query.ray;
-    for (const float number : {r.org_x, r.org_y, r.org_z, r.dir_x, r.dir_y, r.dir_z})
-        if (!(std::abs(number) <= 1e18F)) return;
+    if (!castable({r.org_x, r.org_y, r.org_z}) || !castable({r.dir_x, r.dir_y, r.dir_z})) return;
     rtcIntersect1(scene.scene, &context.embree, &query);
     if (context.out_of_memory) throw Error(ErrorCode::too_large, "tracing: out of memory for the surfaces along one ray");
 

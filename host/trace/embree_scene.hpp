@@ -4,6 +4,7 @@
 // so that a scene's unit of length changes no bit of what Embree computes and no product of lengths leaves float32's range.
 #pragma once
 
+#include <cmath>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -62,5 +63,13 @@ private:
 
     std::vector<std::shared_ptr<const CutOuts>> images_; // that `cuts` points into
 };
+
+// Whether Embree takes a ray with this origin or direction. For others it ends the process (Debian builds it with its assertions); its own limit is
+// 1.8e18.
+inline bool castable(const Imath::V3f& v)
+{
+    constexpr float most = 1e18F;
+    return std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most; // false: NaN
+}
 
 } // namespace penumbra

@@ -293,11 +293,9 @@ private:
     std::atomic<std::uint64_t> rays_{0}, followed_{0}, behind_{0}, left_{0};
 };
 
-// Embree ends the process for a ray that it cannot cast (Debian builds it with its assertions), and one in millions is enough.
 void check_castable(const Imath::V3f& v)
 {
-    constexpr float most = 1e18F; // Embree's own limit is 1.8e18
-    if (std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most) return;
+    if (castable(v)) return;
     throw Error(ErrorCode::invalid_input, "a ray cannot be cast: it starts at, or goes by, a length beyond 1e18 or none at all",
                 "expected lights, cameras and depth of lengths up to 1e12");
 }
