@@ -1,6 +1,9 @@
 // The benches. Each prints rows (CSV) to standard output.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include <penumbra/penumbra.hpp>
 
 namespace penumbra::bench {
@@ -26,6 +29,8 @@ void occlusion_sheet(const Engine& engine);     // a tilted sheet: more slices m
 void smoothies(const Engine& engine);           // smoothie over buffers, triangles and widths, beside shadow maps
 void smoothie_light_size(const Engine& engine); // its error over the light's size
 void image_io(const Engine& engine);            // images from and to bytes beside OpenImageIO
+void suite(const Engine& engine);               // ten scenes by several settings and by rays, 4096-ray references
+std::vector<std::string>& suite_settings();     // those of the suite, "kind:key=value,key=value"; empty: the usual ones
 void limits(const Engine& engine);              // the device's arithmetic and memory limits, and what the inner loop reaches
 
 // GB/s read and written by a kernel that copies 256 MiB.

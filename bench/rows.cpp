@@ -82,6 +82,7 @@ Row measure(const Engine& engine, const Scene& scene, const Technique& technique
     row.kernel_ms = timing_of(kernel).median;
     row.pairs = static_cast<double>(mask.report.pairs);
     row.pairs_per_s = row.pairs / (row.kernel_ms * 1e-3);
+    if (mask.report.receivers > 0) row.share_shaded = static_cast<double>(mask.report.receivers_shaded) / static_cast<double>(mask.report.receivers);
     row.device_bytes = static_cast<double>(mask.report.peak_device_bytes);
     return row;
 }

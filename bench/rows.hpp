@@ -23,6 +23,7 @@ struct Row {
     double pairs = 0;       // (texel, receiver) pairs, or rays
     double pairs_per_s = 0; // of the kernels' time, or of the wall time for rays
     double device_bytes = 0;
+    double share_shaded = 1; // of the receivers, with a tolerance
 };
 
 // Prints what is measured, as a comment: version, device, driver.

@@ -1,9 +1,7 @@
 // Soft Shadow Maps with a union: which of 32 x 32 samples of the light the micro-patches of one or two occluder maps hide, a bit each.
 //
-// Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. The samples are the
-// same for every receiver, so that the mask has no noise: (i, k) lies at u = (i + r(k)) / 32, v = (k + q(i)) / 32, with r(k) = (j + 1/2) / 32 and
-// q(i) = ((19 j + 25) mod 32 + 1/2) / 32, j being the number with its five bits reversed. A straight edge of any direction is resolved to 7/1024 at the
-// worst, 4/1024 on average, along an axis to 1/1024. (With r for q, places mirrored at the diagonal coincide, and an edge along it is off by 16/1024.)
+// Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. Which samples: see
+// common/light_pattern.clh.
 //
 // Specialisation constants: LANES, ITEM_ROWS, TILE_ROWS as in soft_shadow_map.cl
 #include "common/choices.h"
@@ -11,41 +9,29 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/lanes.clh"
+#include "common/light_pattern.clh"
 #include "common/patch_limits.clh"
 #include "common/patch_search.clh"
 #include "common/stop.clh"
 
-#define SIDE 32 // samples along each side of the light
-
-#if LANES == 1
-typedef uint uintn;
-#define as_uintn as_uint
-#define convert_uintn convert_uint
-#elif LANES == 8
-typedef uint8 uintn;
-#define as_uintn as_uint8
-#define convert_uintn convert_uint8
-#else
-typedef uint16 uintn;
-#define as_uintn as_uint16
-#define convert_uintn convert_uint16
-#endif
-
 // --- Patches -----------------
-
-// A micro-patch: a texel with a disparity for each of its edges, so that neighbours of one surface share theirs.
-typedef struct {
-    float reach;                    // the greatest of the others; 0: nothing is there
-    float middle;                   // the texel's own
-    float left, right, bottom, top; // of its edges
-    float least;                    // the least of the others
-    int joined;                     // edges beyond which the same surface goes on: JOINED_...
-} MicroPatch;
 
 #define JOINED_LEFT 1
 #define JOINED_RIGHT 2
 #define JOINED_BOTTOM 4
 #define JOINED_TOP 8
+#define FULL 16  // every texel is there, and joined to those beside it
+#define SOLID 32 // so is all around it, as far as it is wide, without bending much: nobody sees its outline
+
+// Levels of patches above the texels: the last has 64 x 64 of them.
+#define PATCH_LEVELS 6
+
+// Whether a and b hide as one surface does: they are of one, or what shines between them is less than half a texel, wherever on the light it comes from.
+// gap: the step between two texels that opens that much.
+inline bool is_one(const float before, const float a, const float b, const float after, const float precision, const float gap)
+{
+    return a > 0.0f && b > 0.0f && (fabs(b - a) <= gap || is_joined(before, a, b, after, precision));
+}
 
 // The disparity of the edge between a texel (d) and the one beside it. inner, outer: the texels on either side, with those behind them; middle: halfway
 // between the front and the back of what the texel shows.
@@ -53,14 +39,26 @@ typedef struct {
 // Shared with a neighbour of the same surface it is the mean of the two. At a silhouette the surface falls off towards its rim: a round one as a square
 // root, of which the last texel's middle shows the slope; it ends where front and back meet.
 inline float edge_disparity(const float behind_inner, const float inner, const float d, const float outer, const float behind_outer, const float middle,
-                            const float precision)
+                            const float precision, const float gap)
 {
-    if (is_joined(inner, d, outer, behind_outer, precision)) return 0.5f * (d + outer);
-    if (!is_joined(behind_inner, inner, d, outer, precision)) return middle;
+    if (is_one(inner, d, outer, behind_outer, precision, gap)) return 0.5f * (d + outer);
+    if (!is_one(behind_inner, inner, d, outer, precision, gap)) return middle;
     const float slope = d - inner, towards = middle - d;
     // Away from where front and back meet it is no rim but the plane's own slope.
     if (slope * towards <= 0.0f) return fmax(fma(0.5f, slope, d), 0.5f * d);
     return towards < 0.0f ? fmax(fma(1.4f, slope, d), middle) : fmin(fma(1.4f, slope, d), middle);
+}
+
+inline Along alone(const float d)
+{
+    const Along along = {d, d};
+    return along;
+}
+
+inline Along both(const Along a, const Along b)
+{
+    const Along result = {fmin(a.low, b.low), fmax(a.high, b.high)};
+    return result;
 }
 
 inline float disparity_at(__global const float2* texels, const int2 size, const int x, const int y)
@@ -70,16 +68,17 @@ inline float disparity_at(__global const float2* texels, const int2 size, const 
 
 // micro_patches: the patches of a map.
 //
+//   gap            the step of disparity that opens half a texel, across and down
 //   texels, others [height][width]   (disparity, covered share) of the map and of the other side's; has_others: whether there is one
 //   patches [height][width]
-__kernel void micro_patches(const int2 size, const float precision, const int has_others, __global const float2* restrict texels,
-                            __global const float2* restrict others, __global MicroPatch* restrict patches)
+__kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, __global const float2* restrict texels,
+                            __global const float2* restrict others, __global Patch* restrict patches)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
     const int at = y * size.x + x;
     const float d = texels[at].x;
-    MicroPatch patch = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0};
+    Patch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0};
     if (d > 0.0f) {
         const float other = has_others ? others[at].x : 0.0f, middle = other > 0.0f ? 0.5f * (d + other) : d;
         float row[5], column[5];
@@ -87,72 +86,110 @@ __kernel void micro_patches(const int2 size, const float precision, const int ha
             row[i] = disparity_at(texels, size, x + i - 2, y);
             column[i] = disparity_at(texels, size, x, y + i - 2);
         }
+        const float left = edge_disparity(row[4], row[3], d, row[1], row[0], middle, precision, gap.x);
+        const float right = edge_disparity(row[0], row[1], d, row[3], row[4], middle, precision, gap.x);
+        const float top = edge_disparity(column[4], column[3], d, column[1], column[0], middle, precision, gap.y);
+        const float bottom = edge_disparity(column[0], column[1], d, column[3], column[4], middle, precision, gap.y);
         patch.middle = d;
-        patch.left = edge_disparity(row[4], row[3], d, row[1], row[0], middle, precision);
-        patch.right = edge_disparity(row[0], row[1], d, row[3], row[4], middle, precision);
-        patch.top = edge_disparity(column[4], column[3], d, column[1], column[0], middle, precision);
-        patch.bottom = edge_disparity(column[0], column[1], d, column[3], column[4], middle, precision);
-        patch.reach = fmax(fmax(d, fmax(patch.left, patch.right)), fmax(patch.top, patch.bottom));
-        patch.least = fmin(fmin(d, fmin(patch.left, patch.right)), fmin(patch.top, patch.bottom));
-        patch.joined = (is_joined(row[3], d, row[1], row[0], precision) ? JOINED_LEFT : 0) | (is_joined(row[1], d, row[3], row[4], precision) ? JOINED_RIGHT : 0)
-                       | (is_joined(column[3], d, column[1], column[0], precision) ? JOINED_TOP : 0)
-                       | (is_joined(column[1], d, column[3], column[4], precision) ? JOINED_BOTTOM : 0);
+        patch.left = alone(left);
+        patch.right = alone(right);
+        patch.top = alone(top);
+        patch.bottom = alone(bottom);
+        patch.reach = fmax(fmax(d, fmax(left, right)), fmax(top, bottom));
+        patch.least = fmin(fmin(d, fmin(left, right)), fmin(top, bottom));
+        patch.flags = FULL | (is_one(row[3], d, row[1], row[0], precision, gap.x) ? JOINED_LEFT : 0) | (is_one(row[1], d, row[3], row[4], precision, gap.x) ? JOINED_RIGHT : 0)
+                      | (is_one(column[3], d, column[1], column[0], precision, gap.y) ? JOINED_TOP : 0)
+                      | (is_one(column[1], d, column[3], column[4], precision, gap.y) ? JOINED_BOTTOM : 0);
     }
     patches[at] = patch;
 }
 
+// joined_patches: a level of patches from the one below.
+//
+//   patches  every level; [below_size.y][below_size.x] of one begin at `below_begin`, [size.y][size.x] of the next at `begin`
+__kernel void joined_patches(const int2 below_size, const int2 size, const int below_begin, const int begin, __global Patch* patches)
+{
+    __global const Patch* const below = patches + below_begin;
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    Patch all = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0};
+    const int right = min(2 * x + 1, below_size.x - 1), bottom = min(2 * y + 1, below_size.y - 1);
+    const Patch a = below[2 * y * below_size.x + 2 * x], b = below[2 * y * below_size.x + right], c = below[bottom * below_size.x + 2 * x],
+                d = below[bottom * below_size.x + right];
+    all.reach = fmax(fmax(a.reach, b.reach), fmax(c.reach, d.reach));
+    const int inside = a.flags & b.flags & c.flags & d.flags & FULL;
+    if (inside && right == 2 * x + 1 && bottom == 2 * y + 1 && (a.flags & JOINED_RIGHT) && (c.flags & JOINED_RIGHT) && (a.flags & JOINED_BOTTOM) && (b.flags & JOINED_BOTTOM)) {
+        all.least = fmin(fmin(a.least, b.least), fmin(c.least, d.least));
+        all.middle = 0.25f * (a.middle + b.middle + c.middle + d.middle);
+        all.left = both(a.left, c.left);
+        all.right = both(b.right, d.right);
+        all.top = both(a.top, b.top);
+        all.bottom = both(c.bottom, d.bottom);
+        all.flags = FULL | (a.flags & c.flags & JOINED_LEFT) | (b.flags & d.flags & JOINED_RIGHT) | (a.flags & b.flags & JOINED_TOP) | (c.flags & d.flags & JOINED_BOTTOM);
+    }
+    patches[begin + y * size.x + x] = all;
+}
+
+// solid_patches: marks what is SOLID of a level. A receiver sees the outermost places of a patch's edges; they lie beyond the true ones by no more than the
+// patch's range of disparities moves a place on the map. Where the same surface goes on for twice that, it hides what lies between.
+//
+//   moves  by how many of the level's patches one unit of disparity moves a place on the map, for light from the light's edge
+__kernel void solid_patches(const int2 size, const float2 moves, const int begin, __global Patch* all_patches)
+{
+    __global Patch* const patches = all_patches + begin;
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x < 1 || y < 1 || x >= size.x - 1 || y >= size.y - 1) return;
+    float reach = 0.0f, least = MAXFLOAT;
+    int all = FULL;
+    for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) {
+            __global const Patch* const p = patches + (y + j) * size.x + x + i;
+            const int flags = p->flags, beside = (i < 1 ? JOINED_RIGHT : 0) | (j < 1 ? JOINED_BOTTOM : 0);
+            if ((flags & beside) != beside) all = 0;
+            all &= flags;
+            reach = fmax(reach, p->reach);
+            least = fmin(least, p->least);
+        }
+    if (all && (reach - least) * fmax(moves.x, moves.y) <= 0.5f) patches[y * size.x + x].flags |= SOLID;
+}
+
 // --- Bits -----------------
 
-// Columns i with q(i) below m / 32 less half a step: the first m in the order of (19 j + 25) mod 32, j being i with its bits reversed.
-__constant uint columns_below[SIDE + 1] = {
-    0x00000000u, 0x00800000u, 0x00800008u, 0x02800008u, 0x02804008u, 0x02844008u, 0x02844018u, 0x82844018u, 0x82844818u, 0x82a44818u, 0x82a4481au,
-    0x86a4481au, 0x86a4581au, 0x86a5581au, 0x86a5589au, 0xa6a5589au, 0xa6a55a9au, 0xa6e55a9au, 0xa6e55a9eu, 0xa7e55a9eu, 0xa7e5da9eu, 0xa7edda9eu,
-    0xa7eddabeu, 0xe7eddabeu, 0xe7eddebeu, 0xe7fddebeu, 0xe7fddebfu, 0xeffddebfu, 0xeffdfebfu, 0xeffffebfu, 0xeffffeffu, 0xfffffeffu, 0xffffffffu};
-
-// r(k), the phase of a row's samples, of a column.
-__constant float phases[SIDE] = {
-    0.015625f, 0.515625f, 0.265625f, 0.765625f, 0.140625f, 0.640625f, 0.390625f, 0.890625f, 0.078125f, 0.578125f, 0.328125f,
-    0.828125f, 0.203125f, 0.703125f, 0.453125f, 0.953125f, 0.046875f, 0.546875f, 0.296875f, 0.796875f, 0.171875f, 0.671875f,
-    0.421875f, 0.921875f, 0.109375f, 0.609375f, 0.359375f, 0.859375f, 0.234375f, 0.734375f, 0.484375f, 0.984375f};
+// 1 / x to 2 units in the last place, x a positive normal number: a linear guess of the bits and three Newton steps, a third of a division's time.
+inline floatn reciprocal(const floatn x)
+{
+    floatn r = as_floatn((intn)(0x7ef311c7) - as_intn(x));
+    for (int step = 0; step < 3; ++step) r = fma(r, fma(-x, r, (floatn)(1.0f)), r);
+    return r;
+}
 
 // Where an edge lies in the light, in samples: 0 to SIDE, and up to one beyond.
 inline floatn samples_at(const float edge, const floatn place, const floatn disparity, const floatn own, const floatn least, const float scale)
 {
     const floatn d = select_lanes(least, disparity, disparity > least);
-    const floatn at = fma((edge - place) * scale, (float)SIDE / (d - own), (floatn)(0.5f * SIDE));
+    const floatn at = fma((edge - place) * scale, (float)SIDE * reciprocal(d - own), (floatn)(0.5f * SIDE));
     const floatn low = select_lanes((floatn)(-1.0f), at, at > (floatn)(-1.0f));
     return select_lanes((floatn)(SIDE + 1), low, low < (floatn)(SIDE + 1));
 }
 
-// The samples' columns from ceil(u) on.
-inline uintn columns_from(const floatn u)
-{
-    const uintn first = convert_uintn(ceil(u));
-    return select_lanes((uintn)(0u), (uintn)(0xffffffffu) << (first & 31u), first < 32u);
-}
+// x rounded down, for x from -2^22 to 2^22.
+inline intn whole_below(const floatn x) { return -rounded_up(-x); }
 
-// Columns whose samples lie below `part` of a row, 0 to 1.
-inline uintn columns_in(const floatn part)
+inline int lowest_of(const intn v)
 {
-    int counts[LANES];
-    uint columns[LANES];
-    store_int_lanes(convert_intn(ceil(fma(part, (floatn)(SIDE), (floatn)(-0.5f)))), counts);
-    for (int lane = 0; lane < LANES; ++lane) columns[lane] = columns_below[clamp(counts[lane], 0, SIDE)];
-    return load_lanes(columns);
+#if LANES == 1
+    return v;
+#else
+#if LANES == 16
+    const int8 a = min(v.lo, v.hi);
+#else
+    const int8 a = v;
+#endif
+    const int4 b = min(a.lo, a.hi);
+    const int2 c = min(b.lo, b.hi);
+    return min(c.x, c.y);
+#endif
 }
-
-inline float lowest_of(const floatn v)
-{
-    float lanes[LANES], low = MAXFLOAT;
-    store_lanes(v, lanes);
-    for (int lane = 0; lane < LANES; ++lane) low = lanes[lane] < low ? lanes[lane] : low;
-    return low;
-}
-
-// The disparities that an edge has along a rectangle.
-typedef struct {
-    float low, high;
-} Along;
 
 // A rectangle of patches of one surface that a tile's receivers see as one.
 typedef struct {
@@ -182,145 +219,63 @@ inline void hide(uintn* bits, const Rectangle p, const float2 scale, const float
     const intn some = counts & (u1 > (floatn)(0.0f)) & (u0 < (floatn)(SIDE)) & (v1 > (floatn)(0.0f)) & (v0 < (floatn)(SIDE)) & (u1 > u0) & (v1 > v0);
     if (NONE(some)) return;
 
-    const floatn from_column = select_lanes((floatn)(0.0f), u0, u0 > (floatn)(0.0f)), to_column = select_lanes((floatn)(SIDE), u1, u1 < (floatn)(SIDE));
-    const floatn first = floor(v0), last = floor(v1);
-    const uintn low = ~columns_in(v0 - first), high = columns_in(v1 - last);
-    const int from = max(convert_int(lowest_of(select_lanes((floatn)(SIDE), first, some))), 0),
-              to = min(convert_int(-lowest_of(select_lanes((floatn)(0.0f), -last, some))), SIDE - 1);
+    const intn from_column = in_64ths(select_lanes((floatn)(0.0f), u0, u0 > (floatn)(0.0f))), to_column = in_64ths(select_lanes((floatn)(SIDE), u1, u1 < (floatn)(SIDE)));
+    // Rows from -1 to SIDE; of the first and the last, some columns.
+    const intn first = whole_below(v0), last = whole_below(v1);
+    const uintn low = ~columns_in(v0 - convert_floatn(first)), high = columns_in(v1 - convert_floatn(last));
+    const int from = max(lowest_of(select_lanes((intn)(SIDE), first, some)), 0), to = min(-lowest_of(select_lanes((intn)(0), -last, some)), SIDE - 1);
+    const intn begin = select_lanes((intn)(SIDE), first, some);
     for (int k = from; k <= to; ++k) {
-        const floatn row = (floatn)(k), phase = (floatn)(phases[k]);
-        uintn columns = columns_from(from_column - phase) & ~columns_from(to_column - phase);
-        columns &= select_lanes((uintn)(0u), select_lanes((uintn)(0xffffffffu), low, row == first), some & (row >= first));
-        columns &= select_lanes((uintn)(0u), select_lanes((uintn)(0xffffffffu), high, row == last), row <= last);
+        uintn columns = columns_from(from_column, k) & ~columns_from(to_column, k);
+        columns &= select_lanes(select_lanes((uintn)(0u), (uintn)(0xffffffffu), begin < k), low, begin == k);
+        columns &= select_lanes(select_lanes((uintn)(0u), (uintn)(0xffffffffu), last > k), high, last == k);
         bits[k] |= columns;
     }
 }
 
 // --- Patches that are seen as one -----------------
 
-// A run of patches in a row, or such runs below each other.
-typedef struct {
-    int first, last, top_row, bottom_row; // texels
-    float reach, least;                   // greatest and least disparity of all its edges
-    float middle_sum;
-    Along left, right, bottom, top;
-    int joined;                           // edges beyond which the surface goes on everywhere
-} Run;
-
-inline Along both(const Along a, const Along b)
-{
-    const Along result = {fmin(a.low, b.low), fmax(a.high, b.high)};
-    return result;
-}
-
 // How far the disparities of patches may differ that tile's receivers see as one: an edge, at most half the light from its middle, then moves by less than half a
 // sample.
 inline bool may_be_one(const Search search, const float reach, const float least) { return (reach - least) * (float)SIDE <= least - search.box.s5; }
 
-inline Run run_of(const MicroPatch p, const int i, const int j)
-{
-    const Run run = {i, i, j, j, p.reach, p.least, p.middle, {p.left, p.left}, {p.right, p.right}, {p.bottom, p.bottom}, {p.top, p.top}, p.joined};
-    return run;
-}
-
-// The texels of row j from `first` to below `last` with something above the tile's furthest receiver, in runs; at most BLOCK.
-inline int runs_of_row(Run* runs, __global const MicroPatch* patches, const int width, const Search search, const int j, const int first, const int last)
-{
-    int found = 0;
-    bool open = false;
-    for (int i = first; i < last; ++i) {
-        const MicroPatch p = patches[j * width + i];
-        if (!(p.middle > search.box.s4)) {
-            open = false;
-            continue;
-        }
-        if (open) {
-            Run* const run = runs + found - 1;
-            const float reach = fmax(run->reach, p.reach), least = fmin(run->least, p.least);
-            if ((p.joined & JOINED_LEFT) && may_be_one(search, reach, least)) {
-                run->last = i;
-                run->reach = reach;
-                run->least = least;
-                run->middle_sum += p.middle;
-                const Run one = run_of(p, i, j);
-                run->right = one.right;
-                run->bottom = both(run->bottom, one.bottom);
-                run->top = both(run->top, one.top);
-                run->joined = (run->joined & p.joined & (JOINED_BOTTOM | JOINED_TOP)) | (run->joined & JOINED_LEFT) | (p.joined & JOINED_RIGHT);
-                continue;
-            }
-        }
-        runs[found++] = run_of(p, i, j);
-        open = true;
-    }
-    return found;
-}
-
-// Whether `lower`, a run of one row, goes on with `upper`, which ends in the row above; then it is added.
-inline bool add_row(Run* upper, const Run lower, const Search search)
-{
-    if (upper->bottom_row + 1 != lower.top_row || upper->first != lower.first || upper->last != lower.last || !(upper->joined & JOINED_BOTTOM) ||
-        !(lower.joined & JOINED_TOP))
-        return false;
-    const float reach = fmax(upper->reach, lower.reach), least = fmin(upper->least, lower.least);
-    if (!may_be_one(search, reach, least)) return false;
-    upper->bottom_row = lower.bottom_row;
-    upper->reach = reach;
-    upper->least = least;
-    upper->middle_sum += lower.middle_sum;
-    upper->left = both(upper->left, lower.left);
-    upper->right = both(upper->right, lower.right);
-    upper->bottom = lower.bottom;
-    upper->joined = (upper->joined & lower.joined & (JOINED_LEFT | JOINED_RIGHT)) | (upper->joined & JOINED_TOP) | (lower.joined & JOINED_BOTTOM);
-    return true;
-}
-
 // Beyond which nothing goes on, an edge lies in the middle of where it is.
 inline Along edge_of(const Along along, const int joined)
 {
-    const float middle = 0.5f * (along.low + along.high);
-    const Along edge = {joined ? along.low : middle, joined ? along.high : middle};
+    const Along edge = {joined ? along.low : 0.5f * (along.low + along.high), joined ? along.high : 0.5f * (along.low + along.high)};
     return edge;
 }
 
-inline Rectangle rectangle_of(const Run run, const float2 texel)
+inline Rectangle rectangle_of(const Patch p, const int x, const int y, const float2 cell)
 {
-    const int columns = run.last - run.first + 1, rows = run.bottom_row - run.top_row + 1;
-    const Rectangle rectangle = {run.first * texel.x - 1.0f,
-                                 (run.last + 1) * texel.x - 1.0f,
-                                 1.0f - (run.bottom_row + 1) * texel.y,
-                                 1.0f - run.top_row * texel.y,
-                                 run.middle_sum / (columns * rows),
-                                 edge_of(run.left, run.joined & JOINED_LEFT),
-                                 edge_of(run.right, run.joined & JOINED_RIGHT),
-                                 edge_of(run.bottom, run.joined & JOINED_BOTTOM),
-                                 edge_of(run.top, run.joined & JOINED_TOP)};
+    const Rectangle rectangle = {x * cell.x - 1.0f,
+                                 (x + 1) * cell.x - 1.0f,
+                                 1.0f - (y + 1) * cell.y,
+                                 1.0f - y * cell.y,
+                                 p.middle,
+                                 edge_of(p.left, p.flags & JOINED_LEFT),
+                                 edge_of(p.right, p.flags & JOINED_RIGHT),
+                                 edge_of(p.bottom, p.flags & JOINED_BOTTOM),
+                                 edge_of(p.top, p.flags & JOINED_TOP)};
     return rectangle;
 }
 
-// The patches of a block, texels near.xy to below near.zw, that matter to a tile, as few rectangles; at most BLOCK BLOCK.
-inline int rectangles_of(Rectangle* rectangles, __global const MicroPatch* patches, const int width, const Search search, const int4 near)
+// Whether all of a patch counts for each of LANES receivers, or none of it.
+inline bool on_one_side(const Patch p, const Rectangle r, const Limits limits)
 {
-    Run open[2][BLOCK];
-    int found = 0, count = 0;
-    for (int j = near.y; j < near.w; ++j) {
-        Run* const before = open[(j - near.y) & 1];
-        Run* const now = open[(j - near.y + 1) & 1];
-        const int runs = runs_of_row(now, patches, width, search, j, near.x, near.z);
-        for (int b = 0; b < count; ++b) {
-            bool goes_on = false;
-            for (int n = 0; n < runs && !goes_on; ++n) {
-                Run whole = before[b];
-                goes_on = add_row(&whole, now[n], search);
-                if (goes_on) now[n] = whole;
-            }
-            if (!goes_on) rectangles[found++] = rectangle_of(before[b], search.texel);
-        }
-        count = runs;
-    }
-    const Run* const rest = open[(near.w - near.y) & 1];
-    for (int b = 0; b < count; ++b) rectangles[found++] = rectangle_of(rest[b], search.texel);
-    return found;
+    const floatn middle = fma((floatn)(0.5f * (r.a0 + r.a1)), limits.slope_xi, fma((floatn)(0.5f * (r.b0 + r.b1)), limits.slope_eta, limits.level));
+    const floatn half_plane = fma(fabs(limits.slope_xi), (floatn)(0.5f * (r.a1 - r.a0)), fabs(limits.slope_eta) * (0.5f * (r.b1 - r.b0)));
+    const floatn low = middle - half_plane, high = middle + half_plane;
+    const intn above = (p.least > limits.least) & (p.least > high), below = (p.reach <= limits.least) | (p.reach <= low);
+    return ALL(above | below);
+}
+
+// Whether the penumbra of a cell may meet the box of a tile. x, y: of the level whose cells are so large.
+inline bool meets(const Search search, const float reach, const float2 cell, const int x, const int y)
+{
+    const float2 extent = penumbra_extent(search, reach);
+    return extent.x >= 0.0f && x * cell.x - 1.0f - extent.x <= search.box.s1 + cell.x * 0.0625f && (x + 1) * cell.x - 1.0f + extent.x >= search.box.s0 - cell.x * 0.0625f
+           && 1.0f - (y + 1) * cell.y - extent.y <= search.box.s3 + cell.y * 0.0625f && 1.0f - y * cell.y + extent.y >= search.box.s2 - cell.y * 0.0625f;
 }
 
 // Whether nothing is left to hide from LANES receivers.
@@ -331,17 +286,32 @@ inline bool all_hidden(const uintn* bits, const floatn d)
     return ALL((as_intn(hidden) == (intn)(-1)) | (d == (floatn)(NO_RECEIVER)));
 }
 
+// The box of LANES receivers, as tile_bounds has it of a tile's.
+inline float8 box_of(__global const float* xi, __global const float* eta, __global const float* d)
+{
+    float8 box = (float8)(NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, 0.0f, 0.0f, 0.0f);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (d[lane] == NO_RECEIVER) continue;
+        box.s0 = xi[lane] < box.s0 ? xi[lane] : box.s0;
+        box.s1 = xi[lane] > box.s1 ? xi[lane] : box.s1;
+        box.s2 = eta[lane] < box.s2 ? eta[lane] : box.s2;
+        box.s3 = eta[lane] > box.s3 ? eta[lane] : box.s3;
+        box.s4 = d[lane] < box.s4 ? d[lane] : box.s4;
+        box.s5 = d[lane] > box.s5 ? d[lane] : box.s5;
+    }
+    return box;
+}
+
 // soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `sides` occluder maps of one size.
 //
 //   nearest                            the greatest disparity on the maps
-//   patches_i [height][width]; blocks_i, superblocks_i: pyramids of their reach; of one map, the second is not read
+//   patches_i                          every level of patches, the texels' first
 //   texels_i, steps_i [height][width]  of the maps, for receivers whose plane is not known
 //   the rest                           as in soft_shadow_map.cl
 __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int sides, const float nearest, const float bias,
-                                const float precision, const int has_planes, __global const MicroPatch* restrict patches_0, __global const MicroPatch* restrict patches_1,
+                                const float precision, const int has_planes, const int lists, __global const Patch* restrict patches_0, __global const Patch* restrict patches_1,
                                 __global const float2* restrict texels_0, __global const float2* restrict steps_0, __global const float2* restrict texels_1,
-                                __global const float2* restrict steps_1, __global const float* restrict blocks_0, __global const float* restrict superblocks_0,
-                                __global const float* restrict blocks_1, __global const float* restrict superblocks_1, __global const float8* restrict bounds,
+                                __global const float2* restrict steps_1, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
                                 __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
                                 __global uint* restrict evaluated, __global const volatile int* stop)
@@ -350,62 +320,94 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
     if (x >= receivers.stride || y >= receivers.rows) return;
     const int tile = (y / TILE_ROWS) * (receivers.stride / TILE_WIDTH) + x / TILE_WIDTH;
 
-    uintn bits[ITEM_ROWS][SIDE];
-    for (int row = 0; row < ITEM_ROWS; ++row)
-        for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(0u);
-    bool over[ITEM_ROWS]; // nothing is left to hide
-    for (int row = 0; row < ITEM_ROWS; ++row) over[row] = false;
-    int rows_left = ITEM_ROWS;
-    uint count = 0;
-
     const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
-    const Search search = {bounds[tile], 0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
     const int2 size = (int2)(occluders.width, occluders.height);
-    const int2 block_count = (size + (BLOCK - 1)) / BLOCK, super_count = (block_count + (BLOCK - 1)) / BLOCK;
-    const int4 supers = window(search, nearest, search.texel * (BLOCK * BLOCK), (int2)(0), super_count);
-    for (int side = 0; side < sides; ++side) {
-        __global const MicroPatch* const own_patches = side ? patches_1 : patches_0;
-        __global const float* const own_blocks = side ? blocks_1 : blocks_0;
-        __global const float* const own_supers = side ? superblocks_1 : superblocks_0;
-        Limits limits[ITEM_ROWS];
-        bool has_limits = false;
-        for (int s = supers.y * super_count.x; s < supers.w * super_count.x && rows_left > 0; ++s) {
-            const int2 super = (int2)(s % super_count.x, s / super_count.x);
-            if (super.x < supers.x || super.x >= supers.z) continue;
-            if (stopped(stop)) return;
-            const int2 low = super * BLOCK;
-            const int4 inside = window(search, own_supers[s], search.texel * BLOCK, low, min(low + BLOCK, block_count));
-            for (int by = inside.y; by < inside.w; ++by)
-                for (int bx = inside.x; bx < inside.z; ++bx) {
-                    const int2 first = (int2)(bx, by) * BLOCK;
-                    const int4 near = window(search, own_blocks[by * block_count.x + bx], search.texel, first, min(first + BLOCK, size));
-                    Rectangle rectangles[BLOCK * BLOCK];
-                    const int found = rectangles_of(rectangles, own_patches, size.x, search, near);
-                    count += found;
-                    for (int row = 0; row < ITEM_ROWS && found > 0; ++row) {
-                        if (over[row]) continue;
-                        const int at = (y + row) * receivers.stride + x;
-                        const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
-                        if (!has_limits)
-                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, side ? texels_1 : texels_0, side ? steps_1 : steps_0,
-                                                             has_planes ? load_lanes(slope_xi + at) : own_d, has_planes ? load_lanes(slope_eta + at) : own_d, own_xi,
-                                                             own_eta, own_d);
-                        for (int i = 0; i < found; ++i) hide(bits[row], rectangles[i], scale, own_xi, own_eta, own_d, limits[row]);
-                    }
-                    has_limits |= found > 0;
-                }
-            for (int row = 0; row < ITEM_ROWS && has_limits; ++row)
-                if (!over[row] && all_hidden(bits[row], load_lanes(d + (y + row) * receivers.stride + x))) {
-                    over[row] = true;
-                    --rows_left;
-                }
-        }
+    int2 sizes[PATCH_LEVELS + 1];
+    int begins[PATCH_LEVELS + 1];
+    sizes[0] = size;
+    begins[0] = 0;
+    for (int level = 1; level <= PATCH_LEVELS; ++level) {
+        sizes[level] = (sizes[level - 1] + 1) / 2;
+        begins[level] = begins[level - 1] + sizes[level - 1].x * sizes[level - 1].y;
     }
+    uint count = 0;
+    const int together = lists ? 1 : ITEM_ROWS;
+    for (int top = 0; top < ITEM_ROWS; top += together) {
+        const Search search = {lists ? box_of(xi + (y + top) * receivers.stride + x, eta + (y + top) * receivers.stride + x, d + (y + top) * receivers.stride + x) : bounds[tile],
+                               0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
+        uintn bits[ITEM_ROWS][SIDE];
+        bool over[ITEM_ROWS]; // nothing is left to hide
+        for (int row = 0; row < together; ++row) {
+            for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(0u);
+            over[row] = false;
+        }
+        int rows_left = together;
+        const int2 last_size = sizes[PATCH_LEVELS];
+        const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
+        for (int side = 0; side < sides; ++side) {
+            __global const Patch* const own_patches = side ? patches_1 : patches_0;
+            Limits limits[ITEM_ROWS];
+            bool has_limits = false;
+            for (int root = roots.y * last_size.x; root < roots.w * last_size.x && rows_left > 0; ++root) {
+                if (root % last_size.x < roots.x || root % last_size.x >= roots.z) continue;
+                if (stopped(stop)) return;
+                // Depth first.
+                int3 cells[3 * PATCH_LEVELS + 1]; // x, y, level
+                int left = 1;
+                cells[0] = (int3)(root % last_size.x, root / last_size.x, PATCH_LEVELS);
+                while (left > 0 && rows_left > 0) {
+                    const int3 at = cells[--left];
+                    const int2 level_size = sizes[at.z];
+                    __global const Patch* const p = own_patches + begins[at.z] + at.y * level_size.x + at.x;
+                    const float2 cell = search.texel * (1 << at.z);
+                    if (!meets(search, p->reach, cell, at.x, at.y)) continue;
+                    if (!has_limits) {
+                        for (int row = 0; row < together; ++row) {
+                            const int place = (y + top + row) * receivers.stride + x;
+                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, side ? texels_1 : texels_0, side ? steps_1 : steps_0,
+                                                             load_lanes((has_planes ? slope_xi : d) + place), load_lanes((has_planes ? slope_eta : d) + place), load_lanes(xi + place),
+                                                             load_lanes(eta + place), load_lanes(d + place));
+                        }
+                        has_limits = true;
+                    }
+                    bool whole = at.z == 0 || ((p->flags & FULL) && ((p->flags & SOLID) || may_be_one(search, p->reach, p->least)));
+                    Rectangle rectangle;
+                    if (whole) {
+                        const Patch patch = *p;
+                        rectangle = rectangle_of(patch, at.x, at.y, cell);
+                        for (int row = 0; row < together && whole && at.z > 0; ++row) whole = over[row] || on_one_side(patch, rectangle, limits[row]);
+                    }
+                    if (!whole) {
+                        for (int child = 0; child < 4; ++child) {
+                            const int3 to = (int3)(2 * at.x + (child & 1), 2 * at.y + (child >> 1), at.z - 1);
+                            if (to.x < sizes[to.z].x && to.y < sizes[to.z].y) cells[left++] = to;
+                        }
+                        continue;
+                    }
+                    count += together;
+                    for (int row = 0; row < together; ++row) {
+                        if (over[row]) continue;
+                        const int place = (y + top + row) * receivers.stride + x;
+                        const floatn own_d = load_lanes(d + place);
+                        hide(bits[row], rectangle, scale, load_lanes(xi + place), load_lanes(eta + place), own_d, limits[row]);
+                        if (at.z < 3 || !all_hidden(bits[row], own_d)) continue;
+                        over[row] = true;
+                        --rows_left;
+                    }
+                }
+                for (int row = 0; row < together && has_limits; ++row)
+                    if (!over[row] && all_hidden(bits[row], load_lanes(d + (y + top + row) * receivers.stride + x))) {
+                        over[row] = true;
+                        --rows_left;
+                    }
+            }
+        }
 
-    for (int row = 0; row < ITEM_ROWS && y + row < receivers.height; ++row) {
-        uintn hidden = (uintn)(0u);
-        for (int k = 0; k < SIDE; ++k) hidden += popcount(bits[row][k]);
-        write_visibility(visibility + (y + row) * receivers.width + x, 1.0f - convert_floatn(hidden) * (1.0f / (SIDE * SIDE)), receivers.width - x, 0);
+        for (int row = top; row < top + together && y + row < receivers.height; ++row) {
+            uintn hidden = (uintn)(0u);
+            for (int k = 0; k < SIDE; ++k) hidden += popcount(bits[row - top][k]);
+            write_visibility(visibility + (y + row) * receivers.width + x, 1.0f - convert_floatn(hidden) * (1.0f / (SIDE * SIDE)), receivers.width - x, 0);
+        }
     }
     if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[tile] = count;
 }

@@ -187,6 +187,34 @@ void prepare_technique(Prepared::State& state, const Casting& casting)
     finish_prepare(work, state);
 }
 
+constexpr int field_side = 128; // texels of the view that is rendered for techniques which need none
+
+// What casts, from the maps that the technique has or from the light's view of the objects. Where the light can have no such view, all receivers are
+// shaded.
+void add_field(Prepared::State& state, const Casting& casting, const Geometry& geometry, const LeftOut& left_out)
+{
+    std::vector<const DepthMap*> maps;
+    for (const DepthMap* map : {casting.depth.front, casting.depth.back})
+        if (map) maps.push_back(map);
+    for (const DepthMap& layer : casting.depth.layers) maps.push_back(&layer);
+    const LightFrame frame = light_frame(state.light);
+    if (!maps.empty()) {
+        state.field = std::make_shared<const OccluderField>(frame, casting.depth.camera, maps);
+        return;
+    }
+    if (!geometry.state().any(&Object::casts)) return;
+    const Stopwatch watch;
+    try {
+        const Camera camera = occluder_camera(state.light, LightCamera{}, geometry.objects(), field_side, field_side, left_out);
+        const Views views = views_of(geometry, &Object::casts, camera, field_side, field_side, true, true, state.device);
+        const std::array<const DepthMap*, 2> both{&views.front, &views.back};
+        state.field = std::make_shared<const OccluderField>(frame, camera, both);
+    } catch (const Error& error) {
+        if (error.code() != ErrorCode::invalid_input) throw;
+    }
+    state.stages.push_back({"render depth", watch.ms(), 0, 0});
+}
+
 // What was found in the depth images that cast.
 void say_quality(Prepared::State& state, const Geometry& geometry)
 {
@@ -315,6 +343,7 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, left_out, shown);
 
     prepare_technique(*state, casting);
+    if (needs.tolerance > 0) add_field(*state, casting, geometry, left_out);
     warn_of_cut_outs(*state, needs, casting, geometry);
     say_quality(*state, geometry);
     state->covered = !maps || (!geometry.objects().empty() && casters_inside(geometry.objects(), state->light_view, left_out));
@@ -334,6 +363,7 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     state->channels = emission.channels;
     state->covered = before.covered;
     state->grounds = before.grounds;
+    state->field = before.field;
     state->warnings = before.warnings;
     opencl::Work work(state->device);
     state->data = under_other_emission(work, before.data, state->light);

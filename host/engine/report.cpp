@@ -84,6 +84,10 @@ std::string report_json(const Report& report)
         {"peak_device_bytes", report.peak_device_bytes},
     };
     if (report.pairs > 0) json["pairs"] = report.pairs;
+    if (report.receivers > 0) {
+        json["receivers"] = report.receivers;
+        json["receivers_shaded"] = report.receivers_shaded;
+    }
     json["warnings"] = report.warnings;
     if (!report.notes.empty()) json["notes"] = report.notes;
 

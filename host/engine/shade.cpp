@@ -9,6 +9,7 @@
 #include "engine/depth_sources.hpp"
 #include "engine/impl.hpp"
 #include "engine/state.hpp"
+#include "refine/coarse_to_fine.hpp"
 #include "scene/depth.hpp"
 #include "scene/parallel.hpp"
 
@@ -99,13 +100,21 @@ void shade_technique(opencl::Work& work, const Prepared::State& state, const Rec
     std::visit([&](const auto& prepared) { shade(work, prepared, receivers, shaded); }, state.data);
 }
 
-// The normals of the receivers' surfaces: fitted, or of what the depth was rendered from. None where neither is known.
-opencl::Buffer<DepthVector> upload_normals(opencl::Work& work, const Receivers& receivers, const DepthSurface* surface)
+// What the technique is to shade, on the host: a whole image, or some of its pixels as a list.
+struct ToShade {
+    const Camera& camera;
+    const DepthMap& depth;
+    const DepthSurface* surface = nullptr;            // lifted points and normals, where the depth is somebody else's
+    const std::vector<DepthVector>* normals = nullptr; // null: not known
+    const ChosenReceivers* chosen = nullptr;
+    std::function<DepthMap(int resolution)> from_light = {};
+};
+
+// The normals of the receivers' surfaces: fitted, or of what the depth was rendered from. Null where neither is known.
+const std::vector<DepthVector>* normals_of(const Receivers& receivers, const DepthSurface* surface)
 {
     const std::vector<DepthVector>* normals = surface ? &surface->normals : receivers.normals ? &receivers.normals->directions : nullptr;
-    if (!normals || normals->size() != receivers.depth->depth.size()) return {};
-    work.stage("upload receivers");
-    return work.upload(std::span<const DepthVector>(*normals), "receiver normals");
+    return normals && normals->size() == receivers.depth->depth.size() ? normals : nullptr;
 }
 
 // The program that a technique shades with; only rays have none.
@@ -126,8 +135,8 @@ void clip(opencl::Work& work, const Prepared::State& state, const Receiving& rec
     Horizon horizon{.light = state.light, .camera = receivers.camera, .width = receivers.width, .height = receivers.height, .points = {}, .depth = {}, .normals = receivers.normals->memory()};
     opencl::Buffer<DepthVector> points;
     opencl::Buffer<float> depth;
-    if (receivers.surface)
-        points = work.upload(std::span<const DepthVector>(receivers.surface->points), "receiver points");
+    if (receivers.surface || receivers.chosen)
+        points = work.upload(std::span<const DepthVector>(receivers.surface ? receivers.surface->points : receivers.chosen->points), "receiver points");
     else
         depth = work.upload(std::span<const float>(receivers.depth->depth), "receiver depth");
     horizon.points = points.memory();
@@ -136,7 +145,7 @@ void clip(opencl::Work& work, const Prepared::State& state, const Receiving& rec
 }
 
 // What the technique made, on the host.
-Image image_of(opencl::Work& work, const Prepared::State& state, const Receivers& receivers, const opencl::Buffer<float>& visibility,
+Image image_of(opencl::Work& work, const Prepared::State& state, const DepthMap& receivers, const opencl::Buffer<float>& visibility,
                Shaded& shaded)
 {
     if (!visibility) return std::move(shaded.image);
@@ -144,6 +153,108 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const Receivers
     Image image{.width = receivers.width, .height = receivers.height, .channels = state.channels, .pixels = work.read(visibility)};
     if (has_emission(state.light) && state.channels == 1) make_grey(image);
     return image;
+}
+
+// The technique's mask of the receivers, clipped at their planes.
+Image shade_image(opencl::Work& work, const Prepared::State& state, const ToShade& receivers, Shaded& shaded)
+{
+    const bool on_host = row_of(kind_of(state.technique)).on_host;
+    // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
+    const bool clips = receivers.normals && !(needs_of(state.technique).depth_images && receivers.surface) && !on_host;
+    opencl::Buffer<DepthVector> normals;
+    if (clips) {
+        work.stage("upload receivers");
+        normals = work.upload(std::span<const DepthVector>(*receivers.normals), "receiver normals");
+    }
+    const Receiving receiving{.camera = receivers.camera,
+                              .width = receivers.depth.width,
+                              .height = receivers.depth.height,
+                              .depth = &receivers.depth,
+                              .device_depth = {},
+                              .surface = receivers.surface,
+                              .chosen = receivers.chosen,
+                              .normals = clips ? &normals : nullptr,
+                              .view = state.light_view,
+                              .from_light = receivers.from_light};
+    opencl::Buffer<float> visibility;
+    if (!on_host) visibility = work.buffer<float>(receivers.depth.depth.size() * static_cast<std::size_t>(state.channels), "visibility");
+    shaded.visibility = visibility.memory();
+    shade_technique(work, state, receiving, shaded);
+    if (clips && visibility) clip(work, state, receiving, visibility.memory());
+    return image_of(work, state, receivers.depth, visibility, shaded);
+}
+
+// Some pixels of the whole as an image of their own.
+class ReceiverList {
+public:
+    ReceiverList(const ToShade& whole, std::span<const std::uint32_t> pixels)
+    {
+        constexpr std::size_t tile = TILE_WIDTH * tile_rows;
+        const std::size_t padded = (pixels.size() + tile - 1) / tile * tile;
+        depth.width = TILE_WIDTH;
+        depth.height = static_cast<int>(padded / TILE_WIDTH);
+        depth.precision = whole.depth.precision;
+        depth.depth.assign(padded, 0.f);
+        points.assign(padded, DepthVector{0, 0, 0});
+        if (whole.normals) normals.assign(padded, DepthVector{0, 0, 0});
+        for (std::size_t i = 0; i < pixels.size(); ++i) {
+            const std::size_t pixel = pixels[i];
+            points[i] = point_of(whole, pixel);
+            depth.depth[i] = points[i].z;
+            if (whole.normals) normals[i] = (*whole.normals)[pixel];
+        }
+        if (whole.surface)
+            surface = {.width = depth.width, .height = depth.height, .camera = whole.camera, .points = points, .normals = normals, .depth = depth.depth, .quality = whole.surface->quality};
+    }
+
+    DepthMap depth;
+    DepthSurface surface;
+    std::vector<DepthVector> points, normals;
+
+private:
+    static DepthVector point_of(const ToShade& whole, std::size_t pixel)
+    {
+        if (whole.surface) return whole.surface->points[pixel];
+        const auto width = static_cast<std::size_t>(whole.depth.width);
+        const Vec3 p = camera_point(whole.camera, whole.depth.width, whole.depth.height, static_cast<double>(pixel % width) + 0.5, static_cast<double>(pixel / width) + 0.5,
+                                    whole.depth.depth[pixel]);
+        return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    }
+};
+
+// Shades coarse to fine, within the technique's tolerance.
+Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade& whole, Shaded& shaded, Report& report)
+{
+    const ReceiverImage image{.camera = whole.camera,
+                              .width = whole.depth.width,
+                              .height = whole.depth.height,
+                              .depth = whole.depth.depth,
+                              .points = whole.surface ? std::span<const DepthVector>(whole.surface->points) : std::span<const DepthVector>{},
+                              .normals = whole.normals ? std::span<const DepthVector>(*whole.normals) : std::span<const DepthVector>{}};
+    ShadeCounts all;
+    const auto shade_list = [&](std::span<const std::uint32_t> pixels) {
+        const ReceiverList list(whole, pixels);
+        const ChosenReceivers chosen{.pixels = pixels, .depth = whole.depth, .surface = whole.surface, .points = list.points};
+        ShadeCounts counts;
+        Shaded one{.visibility = {}, .image = {}, .counts = shaded.counts ? &counts : nullptr, .estimated = shaded.estimated, .bound = nullptr};
+        const Image values = shade_image(work, state,
+                                         {.camera = whole.camera,
+                                          .depth = list.depth,
+                                          .surface = whole.surface ? &list.surface : nullptr,
+                                          .normals = whole.normals ? &list.normals : nullptr,
+                                          .chosen = &chosen},
+                                         one);
+        all += counts;
+        work.stage("choose receivers");
+        return values.pixels;
+    };
+    work.stage("choose receivers");
+    const int channels = has_emission(state.light) ? 3 : state.channels;
+    CoarseToFine result = shade_coarse_to_fine(image, channels, needs_of(state.technique).tolerance, *state.field, shade_list);
+    report.receivers = result.receivers;
+    report.receivers_shaded = result.shaded;
+    if (shaded.counts) *shaded.counts = all;
+    return {.width = image.width, .height = image.height, .channels = channels, .pixels = std::move(result.visibility)};
 }
 
 } // namespace
@@ -171,42 +282,31 @@ Mask shade_estimated(const Prepared& prepared, const Receivers& receivers, bool 
     const double fit_ms = total.ms();
     Mask mask{.visibility = {}, .report = report_of(state, receivers.width, receivers.height)};
     opencl::Work work(state.device);
-    // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
-    const bool clips = !(needs_of(state.technique).depth_images && surface) && !row_of(mask.report.technique).on_host;
-    const opencl::Buffer<DepthVector> normals = clips ? upload_normals(work, receivers, surface.get()) : opencl::Buffer<DepthVector>();
-    const Receiving receiving{.camera = camera,
-                              .width = receivers.width,
-                              .height = receivers.height,
-                              .depth = &*receivers.depth,
-                              .device_depth = {},
-                              .surface = surface.get(),
-                              .normals = normals ? &normals : nullptr,
-                              .view = state.light_view,
-                              .from_light = [&](int resolution) {
-                                  check_pixels(resolution, resolution, "technique.project_resolution");
-                                  const Stopwatch render;
-                                  DepthMap depth = light_view_depth(state, receivers, camera, resolution);
-                                  mask.report.stages.push_back({"render depth", render.ms(), 0, 0});
-                                  return depth;
-                              }};
+    const ToShade whole{.camera = camera,
+                        .depth = *receivers.depth,
+                        .surface = surface.get(),
+                        .normals = normals_of(receivers, surface.get()),
+                        .from_light = [&](int resolution) {
+                            check_pixels(resolution, resolution, "technique.project_resolution");
+                            const Stopwatch render;
+                            DepthMap depth = light_view_depth(state, receivers, camera, resolution);
+                            mask.report.stages.push_back({"render depth", render.ms(), 0, 0});
+                            return depth;
+                        }};
     if (surface) {
         mask.report.notes.push_back(quality_note(surface->quality, "receivers.depth"));
         const std::vector<std::string> warnings = quality_warnings(surface->quality, "receivers.depth");
         mask.report.warnings.insert(mask.report.warnings.end(), warnings.begin(), warnings.end());
     }
     if (surface && !receivers.surface) mask.report.stages.push_back({"fit receivers", fit_ms, 0, 0});
-    opencl::Buffer<float> visibility;
-    if (!row_of(mask.report.technique).on_host)
-        visibility = work.buffer<float>(receivers.depth->depth.size() * static_cast<std::size_t>(state.channels), "visibility");
     if (shows_behind(state.grounds, light_frame(state.light), *receivers.depth, camera))
         mask.report.warnings.emplace_back("receivers lie behind ground that the occluder map was not fitted to: prepared for other receivers, it may miss "
                                           "what casts on these");
     warn_of_dark_side(state.light, receivers, camera, mask.report);
     ShadeCounts counts;
-    Shaded shaded{.visibility = visibility.memory(), .image = {}, .counts = &counts, .estimated = estimated, .bound = bound ? &mask.bound : nullptr};
-    shade_technique(work, state, receiving, shaded);
-    if (normals && visibility) clip(work, state, receiving, visibility.memory());
-    mask.visibility = image_of(work, state, receivers, visibility, shaded);
+    Shaded shaded{.visibility = {}, .image = {}, .counts = &counts, .estimated = estimated, .bound = bound ? &mask.bound : nullptr};
+    const bool some = state.field && !bound && !needs_of(state.technique).receivers_from_light;
+    mask.visibility = some ? shade_some(work, state, whole, shaded, mask.report) : shade_image(work, state, whole, shaded);
 
     add_stages(mask.report.stages, work.finish());
     mask.report.shade_ms = work_ms(mask.report.stages);
@@ -236,6 +336,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .depth = nullptr,
                               .device_depth = cl::Buffer(receivers.depth, true),
                               .surface = nullptr,
+                              .chosen = nullptr,
                               .normals = nullptr,
                               .view = state.light_view,
                               .from_light = {}};

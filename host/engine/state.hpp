@@ -10,6 +10,7 @@
 #include <penumbra/engine.hpp>
 
 #include "opencl/work.hpp"
+#include "refine/occluder_field.hpp"
 #include "scene/ground.hpp"
 #include "technique/techniques.hpp"
 
@@ -34,6 +35,7 @@ struct Prepared::State {
     std::vector<Ground> grounds;                   // that the occluder map was not fitted to, as nothing receives behind them
     std::optional<Geometry> receiver_geometry;     // with objects that receive, where the technique wants the light's view of them
     PreparedTechnique data;
+    std::shared_ptr<const OccluderField> field;    // with a tolerance: what casts, so that fewer receivers are shaded; null: all are
 
     std::vector<Stage> stages;
     double prepare_ms = 0;

@@ -214,11 +214,11 @@ void Work::write(const cl::Buffer& memory, const void* data, std::size_t bytes)
     stages_[current_].bytes += bytes;
 }
 
-void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes)
+void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset)
 {
     ensure_stage();
     translated("reading back " + bytes_text(bytes), [&] {
-        if (bytes > 0) queue_.enqueueReadBuffer(memory, CL_TRUE, 0, bytes, data, nullptr, new_event());
+        if (bytes > 0) queue_.enqueueReadBuffer(memory, CL_TRUE, offset, bytes, data, nullptr, new_event());
         stages_[current_].bytes += bytes;
         check_stop();
         if (!context_->canaries) return;

@@ -75,10 +75,11 @@ public:
         write(buffer.memory(), data.data(), data.size_bytes());
         return buffer;
     }
-    template <class T> std::vector<T> read(const Buffer<T>& buffer)
+    // All elements, or those from `first` on.
+    template <class T> std::vector<T> read(const Buffer<T>& buffer, std::size_t first = 0)
     {
-        std::vector<T> data(buffer.count());
-        read(buffer.memory(), data.data(), data.size() * sizeof(T));
+        std::vector<T> data(buffer.count() - first);
+        read(buffer.memory(), data.data(), data.size() * sizeof(T), first * sizeof(T));
         return data;
     }
 
@@ -127,7 +128,7 @@ private:
     void check_stop() const;
     std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
-    void read(const cl::Buffer& memory, void* data, std::size_t bytes);
+    void read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset);
     void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
                  std::uint64_t bytes);
 

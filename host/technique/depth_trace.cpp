@@ -155,7 +155,8 @@ TechniqueRow row(const DepthTrace&)
             .summary = "Stratified shadow rays, walked through fitted depth images in the images themselves; on the OpenCL device.",
             .source = "docs/depth.md",
             .keys = {integer_key<S>("samples", &S::samples, {1, 65536}, "rays", "shadow rays a receiver"),
-                     integer_key<S>("seed", &S::seed, {0, INT64_MAX}, "", "same seed, same bits")},
+                     integer_key<S>("seed", &S::seed, {0, INT64_MAX}, "", "same seed, same bits"),
+                 tolerance_key<S>()},
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = false,
             .inputs = "depth objects that cast, or occluder depth (front) from the light's centre (or objects that cast); receiver depth (or objects)",
@@ -195,7 +196,7 @@ PreparedDepthTrace prepare(opencl::Work& work, const Casting& casting, const Dep
 void shade(opencl::Work& work, const PreparedDepthTrace& prepared, const Receiving& receivers, Shaded& shaded)
 {
     work.stage("receivers");
-    std::vector<DepthVector> points = receivers.surface ? receivers.surface->points : exact_points(receivers);
+    std::vector<DepthVector> points = receivers.surface ? receivers.surface->points : receivers.chosen ? receivers.chosen->points : exact_points(receivers);
     leave_out_behind(points, prepared.light, receivers.camera);
     const auto on_points = work.upload(std::span<const DepthVector>(points), "receiver points");
     opencl::Buffer<DepthVector> normals;

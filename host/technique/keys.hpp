@@ -43,6 +43,13 @@ SettingKey real_key(std::string_view name, double Settings::*member, RealRange r
             [member](Technique& t, const SettingValue& v) { std::get<Settings>(t).*member = std::get<double>(v); }};
 }
 
+// What every technique has.
+template <class Settings> SettingKey tolerance_key()
+{
+    return real_key<Settings>("tolerance", &Settings::tolerance, {0, 1}, "visibility",
+                              "what computing fewer receivers may add to a pixel's error: those between lie on what was computed around them; 0 computes all");
+}
+
 // The names of an enumeration's values, as users write them: in the order of the enumerators, which count from 0.
 template <std::size_t count> using Names = std::array<std::string_view, count>;
 

@@ -120,7 +120,8 @@ TechniqueRow row(const OcclusionTexture&)
                          "near a receiver's own slice: fade (3.4.2) leaves it out and has the one before fade in; own has it fade in; omit leaves "
                          "it out at once; auto is own where no receiver casts, else fade"),
                      integer_key<S>("light_splits", &S::light_splits, {1, 16}, "parts",
-                                    "n x n parts of a rectangle, each with slices of its own")},
+                                    "n x n parts of a rectangle, each with slices of its own"),
+                 tolerance_key<S>()},
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = false,
             .inputs =

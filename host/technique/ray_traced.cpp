@@ -35,7 +35,8 @@ TechniqueRow row(const RayTraced&)
                      flag_key<S>("adaptive", &S::adaptive,
                                  "first_samples rays everywhere, the rest only near receivers whose visibility is not settled"),
                      integer_key<S>("first_samples", &S::first_samples, {1, 65536}, "rays", "rays of the first pass with adaptive"),
-                     integer_key<S>("seed", &S::seed, {0, INT64_MAX}, "", "same seed, same bits")},
+                     integer_key<S>("seed", &S::seed, {0, INT64_MAX}, "", "same seed, same bits"),
+                 tolerance_key<S>()},
             .lights = {"rectangle", "sphere", "point", "directional"},
             .textured_lights = true,
             .inputs = "objects that cast; receiver depth (or objects that receive)",
@@ -44,10 +45,17 @@ TechniqueRow row(const RayTraced&)
             .defaults = RayTraced{}};
 }
 
+void check_together(const RayTraced& settings)
+{
+    if (settings.adaptive && settings.tolerance > 0)
+        throw Error::at(ErrorCode::invalid_input, "technique.adaptive", "is true and tolerance above 0", "expected one of them: both choose where rays are cast");
+}
+
 Needs needs(const RayTraced&) { return {.casters = Needs::Casters::required, .depth_images = true}; }
 
 PreparedRays prepare(opencl::Work& work, const Casting& casting, const RayTraced& settings, Findings& findings)
 {
+    check_together(settings);
     work.stage("prepare");
     PreparedRays prepared{.settings = settings, .light = casting.light, .casters = casting.tracer(), .images = casting.images};
     work.moved(prepared.casters->bytes());
@@ -63,12 +71,16 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
         const auto there = std::ranges::count_if(receivers.depth->depth, [](float depth) { return depth > 0 && std::isfinite(depth); });
         shaded.estimated(rays.of(static_cast<double>(there) * samples_of_all(prepared.settings) * rays_a_sample(shaded.bound != nullptr)));
     }
-    VisibilityResult result = trace_visibility(*prepared.casters, prepared.light, *receivers.depth, receivers.camera,
+    const ChosenReceivers* chosen = receivers.chosen;
+    VisibilityResult result = trace_visibility(*prepared.casters, prepared.light, chosen ? chosen->depth : *receivers.depth, receivers.camera,
                                                {.samples = prepared.settings.samples,
                                                 .adaptive = prepared.settings.adaptive,
                                                 .first_samples = prepared.settings.first_samples,
                                                 .seed = static_cast<std::uint64_t>(prepared.settings.seed)},
-                                               {.images = prepared.images, .surface = receivers.surface, .bounds = shaded.bound != nullptr});
+                                               {.images = prepared.images,
+                                                .surface = chosen ? chosen->surface : receivers.surface,
+                                                .bounds = shaded.bound != nullptr,
+                                                .pixels = chosen ? chosen->pixels : std::span<const std::uint32_t>{}});
     shaded.image = std::move(result.visibility);
     if (shaded.bound) *shaded.bound = std::move(result.bound);
     if (!shaded.counts) return;

@@ -24,6 +24,7 @@ struct ReceiverPoints {
     // How disparity changes along each receiver's own plane (receivers.cl, receiver_planes); none: planes are not known.
     opencl::Buffer<float> slope_xi, slope_eta;
     bool has_planes = false;
+    bool is_list = false; // neighbours of a row lie together, rows need not
 };
 
 // The transform from `camera` to the space of the light's own view.

@@ -171,7 +171,8 @@ TechniqueRow row(const Smoothie&)
                  flag_key<S>("two_sided", &S::two_sided,
                              "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks"),
                  real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
-                             "self-shadow bound from the surface's slope; 1 is the bound, 0 none")},
+                             "self-shadow bound from the surface's slope; 1 is the bound, 0 none"),
+                 tolerance_key<S>()},
         .lights = {"rectangle", "sphere", "point", "directional"},
         .textured_lights = false,
         .inputs = "occluder depth (front) from the light's centre (or objects that cast); objects that cast, for their silhouettes; "

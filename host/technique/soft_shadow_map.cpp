@@ -1,6 +1,7 @@
 #include "technique/soft_shadow_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <penumbra/error.hpp>
 
@@ -23,18 +24,19 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 
 cl_int2 dimensions(MapSize size) { return {{size.width, size.height}}; }
 
-constexpr int patch_floats = 8; // MicroPatch of soft_shadow_union.cl
+constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
 
-// The levels above `cells`, of which every `stride`-th float counts.
-void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, MapSize size, int stride, const cl::Buffer& cells, const cl::Buffer& blocks,
-                   const cl::Buffer& superblocks)
+// The levels above a side's texels.
+void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, MapSize size, PreparedSoftShadowMap::Side& side)
 {
     const MapSize level_1 = blocks_of(size), level_2 = blocks_of(level_1);
-    work.launch(prepared.program, "nearest_of_block", grid_of(level_1), {16, 4}, count_of(size) * 8, dimensions(size), stride, cells, dimensions(level_1), blocks);
-    work.launch(prepared.program, "nearest_of_block", grid_of(level_2), {16, 4}, count_of(level_1) * 4, dimensions(level_1), 1, blocks, dimensions(level_2),
-                superblocks);
+    side.blocks = work.buffer<float>(count_of(level_1), "depth pyramid, level 1");
+    side.superblocks = work.buffer<float>(count_of(level_2), "depth pyramid, level 2");
+    work.launch(prepared.program, "nearest_of_block", grid_of(level_1), {16, 4}, count_of(size) * 8, dimensions(size), 2, side.map.texels, dimensions(level_1), side.blocks);
+    work.launch(prepared.program, "nearest_of_block", grid_of(level_2), {16, 4}, count_of(level_1) * 4, dimensions(level_1), 1, side.blocks, dimensions(level_2),
+                side.superblocks);
 }
 
 // A union needs surfaces as they are: the mean of two is none of them.
@@ -46,24 +48,49 @@ Reduction reduction_of(const SoftShadowMap& settings)
 PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
                                          MapSize size)
 {
-    const MapSize blocks = blocks_of(size), superblocks = blocks_of(blocks);
     PreparedSoftShadowMap::Side side{
-        .map = occluder_map(work, depth, from, size, reduction_of(prepared.settings), prepared.precision, prepared.program),
-        .patches = {},
-        .blocks = work.buffer<float>(count_of(blocks), "depth pyramid, level 1"),
-        .superblocks = work.buffer<float>(count_of(superblocks), "depth pyramid, level 2")};
-    if (prepared.settings.visibility == PatchVisibility::sum) build_pyramid(work, prepared, size, 2, side.map.texels.memory(), side.blocks.memory(), side.superblocks.memory());
+        .map = occluder_map(work, depth, from, size, reduction_of(prepared.settings), prepared.precision, prepared.program), .patches = {}, .blocks = {}, .superblocks = {}};
+    if (prepared.settings.visibility == PatchVisibility::sum) build_pyramid(work, prepared, size, side);
     return side;
 }
 
-// The patches of a side, which know the other's.
+// The patches of a side, which know the other's, and the levels above them.
 void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, PreparedSoftShadowMap::Side& side, const PreparedSoftShadowMap::Side* other, MapSize size)
 {
-    side.patches = work.buffer<float>(count_of(size) * patch_floats, "micro-patches");
+    std::vector<MapSize> sizes{size};
+    std::size_t count = count_of(size);
+    for (int level = 1; level <= patch_levels; ++level) {
+        sizes.push_back({(sizes.back().width + 1) / 2, (sizes.back().height + 1) / 2});
+        count += count_of(sizes.back());
+    }
+    side.patches = work.buffer<Patch>(count, "micro-patches");
     const float precision = static_cast<float>(prepared.precision);
-    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + 4 * patch_floats), dimensions(size), precision,
-                static_cast<cl_int>(other != nullptr), side.map.texels, other ? other->map.texels.memory() : cl::Buffer(), side.patches);
-    build_pyramid(work, prepared, size, patch_floats, side.patches.memory(), side.blocks.memory(), side.superblocks.memory());
+    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(Patch)), dimensions(size), precision,
+                cl_float2{{prepared.view.light_scale_x * prepared.view.texel_x, prepared.view.light_scale_y * prepared.view.texel_y}}, static_cast<cl_int>(other != nullptr), side.map.texels, other ? other->map.texels.memory() : cl::Buffer(), side.patches);
+    std::size_t below = 0;
+    for (std::size_t level = 1; level < sizes.size(); ++level) {
+        const std::size_t begin = below + count_of(sizes[level - 1]);
+        const float cells = std::ldexp(1.f, static_cast<int>(level));
+        const cl_float2 moves{{0.5f / (prepared.view.light_scale_x * prepared.view.texel_x * cells), 0.5f / (prepared.view.light_scale_y * prepared.view.texel_y * cells)}};
+        work.launch(prepared.program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(Patch), dimensions(sizes[level - 1]),
+                    dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), side.patches);
+        work.launch(prepared.program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(Patch), dimensions(sizes[level]), moves,
+                    static_cast<cl_int>(begin), side.patches);
+        below = begin;
+    }
+    side.last_level = below;
+}
+
+// The greatest disparity of a side.
+float nearest_of(opencl::Work& work, const PreparedSoftShadowMap::Side& side)
+{
+    float nearest = 0;
+    if (side.patches) {
+        for (const Patch& patch : work.read(side.patches, side.last_level)) nearest = std::max(nearest, patch.reach);
+        return nearest;
+    }
+    for (const float d : work.read(side.superblocks)) nearest = std::max(nearest, d);
+    return nearest;
 }
 
 // Rows of a tile that one work-item owns: all of them, or on devices that vectorise by themselves one.
@@ -118,8 +145,8 @@ void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, cons
     const PreparedSoftShadowMap::Side &first = prepared.sides.front(), &second = prepared.sides.back();
     work.launch(prepared.program, "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + first.patches.bytes() * prepared.sides.size(),
                 receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
-                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), first.patches, second.patches,
-                first.map.texels, first.map.steps, second.map.texels, second.map.steps, first.blocks, first.superblocks, second.blocks, second.superblocks, bounds,
+                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && work.context().quirks().lanes > 1), first.patches, second.patches,
+                first.map.texels, first.map.steps, second.map.texels, second.map.steps, bounds,
                 receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }
 
@@ -169,7 +196,8 @@ TechniqueRow row(const SoftShadowMap&)
                              "self-shadow bound of receivers on the casters' own surface; 1 is the bound, 0 none"),
                  flag_key<S>("project", &S::project, "shade in the light's view, then sample that mask from the receivers' camera"),
                  integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
-                                "side of the light's-view mask with project")},
+                                "side of the light's-view mask with project"),
+                 tolerance_key<S>()},
         .lights = {"rectangle", "point"},
         .textured_lights = false,
         .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
@@ -201,8 +229,7 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
     if (settings.visibility == PatchVisibility::united)
         for (std::size_t i = 0; i < prepared.sides.size(); ++i)
             add_patches(work, prepared, prepared.sides[i], prepared.sides.size() == 2 ? &prepared.sides[1 - i] : nullptr, size);
-    for (const auto& side : prepared.sides)
-        for (const float d : work.read(side.superblocks)) prepared.nearest = std::max(prepared.nearest, d);
+    for (const auto& side : prepared.sides) prepared.nearest = std::max(prepared.nearest, nearest_of(work, side));
     return prepared;
 }
 
@@ -217,8 +244,9 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
 
     work.launch(prepared.program, "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view, prepared.nearest,
                 half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
-    if (prepared.settings.visibility == PatchVisibility::united) shade_union(work, prepared, receivers, bounds, visibility, evaluated);
-    for (std::size_t i = 0; i < prepared.sides.size() && prepared.settings.visibility == PatchVisibility::sum; ++i)
+    const bool united = prepared.settings.visibility == PatchVisibility::united; // counts by rows of a tile, sum by tiles
+    if (united) shade_union(work, prepared, receivers, bounds, visibility, evaluated);
+    for (std::size_t i = 0; i < prepared.sides.size() && !united; ++i)
         shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
     if (!counts) return;
@@ -226,7 +254,7 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
         counts->receivers += static_cast<std::uint64_t>(box.s[6]);
         counts->uncovered_receivers += static_cast<std::uint64_t>(box.s[7]);
     }
-    for (const cl_uint texels : work.read(evaluated)) counts->pairs += std::uint64_t{texels} * TILE_WIDTH * tile_rows;
+    for (const cl_uint texels : work.read(evaluated)) counts->pairs += std::uint64_t{texels} * TILE_WIDTH * (united ? 1 : tile_rows);
 }
 
 void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::Buffer& mask, int mask_width, int mask_height,

@@ -14,7 +14,8 @@ struct PreparedSoftShadowMap {
     // One occluder map and its pyramid: the nearest disparity in each block of texels, and in each block of blocks.
     struct Side {
         OccluderMap map;
-        opencl::Buffer<float> patches; // of the union: MicroPatch of soft_shadow_union.cl, each
+        opencl::Buffer<Patch> patches; // of the union: every level, the texels' first
+        std::size_t last_level = 0;    // where the last begins
         opencl::Buffer<float> blocks, superblocks;
     };
     SoftShadowMap settings;

@@ -57,7 +57,13 @@ using PreparedTechnique = PreparedVariant<Technique>::type;
 
 inline Needs needs_of(const Technique& technique)
 {
-    return std::visit([](const auto& settings) { return needs(settings); }, technique);
+    return std::visit(
+        [](const auto& settings) {
+            Needs wanted = needs(settings);
+            wanted.tolerance = settings.tolerance;
+            return wanted;
+        },
+        technique);
 }
 
 // Throws invalid_input for keys that exclude each other.

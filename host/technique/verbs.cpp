@@ -13,13 +13,14 @@ ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera
 
 ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
 {
-    if (receivers.surface) {
-        const DepthSurface& surface = *receivers.surface;
+    if (receivers.surface || receivers.chosen) {
         work.stage("upload receivers");
-        const auto points = work.upload(std::span<const DepthVector>(surface.points), "receiver points");
+        const auto points = work.upload(std::span<const DepthVector>(receivers.surface ? receivers.surface->points : receivers.chosen->points), "receiver points");
         work.stage("receivers");
-        const ReceiverView view = receiver_view(receivers.camera, surface.width, surface.height, receivers.view);
-        return lifted_receiver_points(work, view, points, receivers.depth->precision, program);
+        const ReceiverView view = receiver_view(receivers.camera, receivers.width, receivers.height, receivers.view);
+        ReceiverPoints lifted = lifted_receiver_points(work, view, points, receivers.depth->precision, program);
+        lifted.is_list = receivers.chosen != nullptr;
+        return lifted;
     }
     if (receivers.depth) return points_of(work, *receivers.depth, receivers.camera, receivers.view, program);
     const ReceiverView view = receiver_view(receivers.camera, receivers.width, receivers.height, receivers.view);

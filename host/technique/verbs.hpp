@@ -55,8 +55,10 @@ struct Needs {
     bool depth_images = false;
     // The light's view holds what receives as well, not only what casts on it.
     bool whole_view = false;
-    // Receiving::from_light: what the light sees of the receivers.
+    // Receiving::from_light: what the light sees of the receivers. Their mask is then shaded whole.
     bool receivers_from_light = false;
+    // What computing fewer receivers may add to a pixel's error; 0: each is shaded.
+    double tolerance = 0;
 };
 
 // Depth as the light sees it: planar, row-major, `width` x `height`, in one place or the other. What was not asked for may be missing.
@@ -92,6 +94,14 @@ struct Findings {
     std::vector<std::string> warnings, notes;
 };
 
+// Some pixels of an image of receivers, as an image of their own: row by row in their order, TILE_WIDTH a row, what is left of the last rows empty.
+struct ChosenReceivers {
+    std::span<const std::uint32_t> pixels;  // y width + x of the whole image
+    const DepthMap& depth;                  // of the whole image
+    const DepthSurface* surface;            // of the whole image, where it is somebody else's
+    const std::vector<DepthVector>& points; // of the chosen, in the camera's coordinates; z = 0: none
+};
+
 // The receivers of one mask: the depth image of one camera, on the host or on the device.
 struct Receiving {
     Camera camera;
@@ -99,6 +109,7 @@ struct Receiving {
     const DepthMap* depth = nullptr;
     cl::Buffer device_depth; // where there is no `depth`
     const DepthSurface* surface = nullptr; // what was fitted to `depth`, where it is somebody else's: lifted points and their normals
+    const ChosenReceivers* chosen = nullptr; // where these are some pixels of an image: `depth` and `surface` are theirs, as a list
     // Of each pixel's surface, towards the camera and in its coordinates; null: not known.
     const opencl::Buffer<DepthVector>* normals = nullptr;
     const Camera& view;      // Findings::view
@@ -114,6 +125,17 @@ struct ShadeCounts {
     // Of samples of the light that were followed through depth images, from some receivers of a grid: all, those that pass behind a seen
     // surface and never through one, those that leave the image.
     std::uint64_t followed = 0, behind = 0, left = 0;
+
+    ShadeCounts& operator+=(const ShadeCounts& more)
+    {
+        pairs += more.pairs;
+        receivers += more.receivers;
+        uncovered_receivers += more.uncovered_receivers;
+        followed += more.followed;
+        behind += more.behind;
+        left += more.left;
+        return *this;
+    }
 };
 
 // Where shade puts its result: into the buffer where it runs on the device, into the image where it runs on the host.

@@ -55,6 +55,7 @@ struct SeenScene {
     std::span<const std::shared_ptr<const DepthImage>> images; // walked with the same samples
     const DepthSurface* surface = nullptr;                     // receivers of somebody else's depth: lifted, the light clipped at their planes
     bool bounds = false;                                       // VisibilityResult::bound is wanted
+    std::span<const std::uint32_t> pixels = {};                // y width + x: these alone, without `adaptive` and bounds; the result is a row of them
 };
 
 struct VisibilityResult {

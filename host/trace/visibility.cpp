@@ -26,6 +26,7 @@ namespace penumbra {
 namespace {
 
 constexpr int tile = 4;
+constexpr std::size_t pixels_together = 64;
 constexpr int followed_step = 16; // receivers whose rays are followed to their end: one of so many each way
 
 // What a light's texture weighs: nearest texel, constant over the texel, so that sums over texels are exact.
@@ -120,14 +121,17 @@ public:
                                .half_u = direction_from_world(to, frame.u * frame.half_u),
                                .half_v = direction_from_world(to, frame.v * frame.half_v)});
         }
-        result_.visibility = {.width = receivers.width, .height = receivers.height, .channels = light.emission ? 3 : 1, .pixels = {}};
+        const bool some = !seen.pixels.empty();
+        result_.visibility = {.width = some ? static_cast<int>(seen.pixels.size()) : receivers.width, .height = some ? 1 : receivers.height, .channels = light.emission ? 3 : 1, .pixels = {}};
         result_.visibility.pixels.assign(result_.visibility.pixel_count() * static_cast<std::size_t>(result_.visibility.channels), 1.f);
     }
 
     VisibilityResult trace()
     {
         const int samples = light_.coincident() ? 1 : options_.samples;
-        if (options_.adaptive && options_.first_samples < samples)
+        if (!seen_.pixels.empty())
+            cast_pixels(samples);
+        else if (options_.adaptive && options_.first_samples < samples)
             adaptive(samples);
         else
             cast_tiles(samples, 0, {}, nullptr);
@@ -192,6 +196,29 @@ private:
                         if (receiver.followed) count_followed(tally);
                     }
                 if (met) (*met)[tile_index(column, row)] = seen;
+            }
+            rays_ += rays;
+        });
+    }
+
+    // Casts `samples` rays from each of the pixels that are asked for: the same rays as in the whole image.
+    void cast_pixels(int samples)
+    {
+        const Strata strata = make_strata(samples, light_.half_u == Vec3(0, 0, 0), light_.half_v == Vec3(0, 0, 0));
+        const std::size_t count = seen_.pixels.size();
+        parallel_for(static_cast<int>((count + pixels_together - 1) / pixels_together), [&](int group) {
+            NearSurfaces scratch;
+            std::uint64_t rays = 0;
+            const std::size_t first = static_cast<std::size_t>(group) * pixels_together;
+            for (std::size_t i = first; i < std::min(count, first + pixels_together); ++i) {
+                check_stop();
+                const int x = static_cast<int>(seen_.pixels[i] % static_cast<std::uint32_t>(receivers_.width)), y = static_cast<int>(seen_.pixels[i] / static_cast<std::uint32_t>(receivers_.width));
+                const Receiver receiver = receiver_at(x, y, scratch);
+                if (!receiver.sees_light) continue;
+                const Tally tally = cast(receiver, strata, pixel_key(x, y, 0));
+                rays += static_cast<std::uint64_t>(tally.rays);
+                store(static_cast<int>(i), 0, tally);
+                if (receiver.followed) count_followed(tally);
             }
             rays_ += rays;
         });

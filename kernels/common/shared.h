@@ -42,6 +42,20 @@ typedef struct {
     float edge_on_x, edge_on_y;     // 1 / (2 k h): times a surface's disparity step a texel, 1 where the surface is edge-on to the light
 } OccluderView;
 
+// The disparities that an edge has along a patch.
+typedef struct {
+    float low, high;
+} Along;
+
+// A micro-patch: a texel with a disparity for each of its edges, so that neighbours of one surface share theirs. Or 2 x 2, 4 x 4, ... of them.
+typedef struct {
+    float reach;                    // the greatest disparity of any edge; 0: nothing is there
+    float least;                    // the least
+    float middle;                   // of the middle
+    Along left, right, bottom, top; // of the edges
+    int flags;                      // JOINED_...: beyond that edge the same surface goes on; FULL, SOLID
+} Patch;
+
 // What casts, as soft_shadow_volume's kernels search it: sheets of light-facing triangles with the edges around them, in groups of WEDGE_GROUP.
 #define WEDGE_GROUP 16
 #define WEDGE_PLANES 26 // floats an edge for linear coverage: wedge_linear.clh

@@ -41,6 +41,7 @@ struct Report {
     std::vector<Stage> stages;
     std::uint64_t peak_device_bytes = 0;
     std::uint64_t pairs = 0; // (occluder texel, receiver) pairs evaluated; 0 where that means nothing
+    std::uint64_t receivers = 0, receivers_shaded = 0; // with a tolerance: how many there are, and how many were computed; else 0
     std::vector<std::string> warnings;
     std::vector<std::string> notes; // what was built, where the technique has something to say about it
 };

@@ -10,6 +10,7 @@ namespace penumbra {
 struct DepthTrace {
     int samples = 64; // rays a receiver
     std::int64_t seed = 1;
+    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };
 
 } // namespace penumbra

@@ -30,6 +30,7 @@ struct OcclusionTexture {
     // own is left out at once. automatic: own where no receiver casts, else fade. What lies beyond the last caster sees every slice in full.
     SelfShadow self_shadow = SelfShadow::automatic;
     int light_splits = 1; // n x n parts of a rectangle, each with slices of its own
+    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };
 
 } // namespace penumbra

@@ -11,6 +11,7 @@ struct RayTraced {
     bool adaptive = false; // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
     int first_samples = 16;
     std::int64_t seed = 1;
+    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };
 
 } // namespace penumbra

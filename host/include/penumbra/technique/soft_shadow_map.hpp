@@ -21,6 +21,7 @@ struct SoftShadowMap {
     double bias = 1.0;                               // in units of the bound derived from each texel's slope and the depth's precision
     bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
     int project_resolution = 512;                    // of that mask
+    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };
 
 } // namespace penumbra

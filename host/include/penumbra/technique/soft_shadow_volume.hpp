@@ -22,6 +22,7 @@ struct SoftShadowVolume {
     WedgeBuffer buffer = WedgeBuffer::binary32; // the papers' integer buffers, for study
     WedgeCulling culling = WedgeCulling::tight; // what spares pairs of edge and receiver, for study; the mask is the same
     double bias = 1.0;                          // of casters made from depth maps: half texels that count as the receiver's own surface
+    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };
 
 } // namespace penumbra

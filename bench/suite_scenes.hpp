@@ -1,0 +1,20 @@
+// The scenes on which techniques and rays are compared at equal error.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <penumbra/penumbra.hpp>
+
+namespace penumbra::bench {
+
+struct SuiteScene {
+    std::string name;
+    Scene scene;
+};
+
+// Ten, each of an occluder over the plane of paper_scene (scenes.hpp), which only receives: closed and open, near and far, under lights that are small,
+// of the casters' size, and larger than the scene. Both maps have `texels` a side.
+std::vector<SuiteScene> suite_scenes(int texels, int receivers);
+
+} // namespace penumbra::bench

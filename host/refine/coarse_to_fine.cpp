@@ -1,0 +1,289 @@
+#include "refine/coarse_to_fine.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "depth_image/depth_image.hpp"
+#include "scene/camera.hpp"
+#include "scene/parallel.hpp"
+
+namespace penumbra {
+namespace {
+
+constexpr int coarsest = 16;         // pixels along a block's side
+constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
+constexpr float turned = 0.15f;      // how far its normals may turn, in radians
+constexpr double most_passed = 0.25; // of the light, from one shaded receiver to the next
+constexpr int many_blocks = 64;      // that a thread takes at once
+
+// A block of receivers, its last column and row included: neighbours share theirs.
+struct Block {
+    std::int32_t x0, y0, x1, y1;
+    std::int32_t middle_x() const { return (x0 + x1) / 2; }
+    std::int32_t middle_y() const { return (y0 + y1) / 2; }
+    bool whole() const { return x1 - x0 <= 2 && y1 - y0 <= 2; } // the nine are all its pixels
+};
+
+// What a block is before anything of it is shaded.
+enum class BlockKind : std::uint8_t { empty, divided, asked };
+
+class Shading {
+public:
+    Shading(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade)
+        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(tolerance)), field_(field), shade_(shade)
+    {
+        const std::size_t count = static_cast<std::size_t>(receivers.width) * static_cast<std::size_t>(receivers.height);
+        result_.visibility.assign(count * channels_, 1.f);
+        known_.assign(count, 0);
+        nearness_.resize(count);
+        parallel_for(receivers.height, [&](int y) { measure_row(y); });
+        pixel_ = 2 * std::max(receivers.camera.half_extent.x / receivers.width, receivers.camera.half_extent.y / receivers.height);
+    }
+
+    CoarseToFine run()
+    {
+        std::vector<Block> blocks = roots(), kept;
+        while (!blocks.empty()) {
+            const std::vector<BlockKind> kinds = kinds_of(blocks);
+            ask(blocks, kinds);
+            blocks = divided(blocks, kinds, kept);
+        }
+        parallel_for(static_cast<int>((kept.size() + many_blocks - 1) / many_blocks), [&](int group) {
+            const std::size_t from = static_cast<std::size_t>(group) * many_blocks, to = std::min(kept.size(), from + many_blocks);
+            for (std::size_t i = from; i < to; ++i) interpolate(kept[i]);
+        });
+        for (const float nearness : nearness_) result_.receivers += nearness != 0;
+        return std::move(result_);
+    }
+
+private:
+    std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * static_cast<std::size_t>(receivers_.width) + static_cast<std::size_t>(x); }
+    double depth_at(std::size_t pixel) const { return receivers_.points.empty() ? receivers_.depth[pixel] : receivers_.points[pixel].z; }
+
+    // What is linear over a plane's image: 1 / z, of an orthographic camera z. 0: no receiver.
+    void measure_row(int y)
+    {
+        const bool orthographic = receivers_.camera.orthographic;
+        for (int x = 0; x < receivers_.width; ++x) {
+            const float z = static_cast<float>(depth_at(at(x, y)));
+            nearness_[at(x, y)] = z > 0 && std::isfinite(z) ? (orthographic ? z : 1 / z) : 0;
+        }
+    }
+
+    std::vector<Block> roots() const
+    {
+        std::vector<Block> blocks;
+        for (int y = 0; y == 0 || y < receivers_.height - 1; y += coarsest)
+            for (int x = 0; x == 0 || x < receivers_.width - 1; x += coarsest)
+                blocks.push_back({x, y, std::min(x + coarsest, receivers_.width - 1), std::min(y + coarsest, receivers_.height - 1)});
+        return blocks;
+    }
+
+    template <class Body> void for_each(const std::vector<Block>& blocks, const Body& body) const
+    {
+        parallel_for(static_cast<int>((blocks.size() + many_blocks - 1) / many_blocks), [&](int group) {
+            const std::size_t from = static_cast<std::size_t>(group) * many_blocks, to = std::min(blocks.size(), from + many_blocks);
+            for (std::size_t i = from; i < to; ++i) body(i);
+        });
+    }
+
+    std::vector<BlockKind> kinds_of(const std::vector<Block>& blocks) const
+    {
+        std::vector<BlockKind> kinds(blocks.size());
+        for_each(blocks, [&](std::size_t i) {
+            const Block& block = blocks[i];
+            if (empty(block))
+                kinds[i] = BlockKind::empty;
+            else
+                kinds[i] = block.whole() || (smooth(block) && resolved(block)) ? BlockKind::asked : BlockKind::divided;
+        });
+        return kinds;
+    }
+
+    bool empty(const Block& block) const
+    {
+        for (int y = block.y0; y <= block.y1; ++y)
+            for (int x = block.x0; x <= block.x1; ++x)
+                if (nearness_[at(x, y)] != 0) return false;
+        return true;
+    }
+
+    // Whether the receivers are of one surface without creases.
+    bool smooth(const Block& block) const
+    {
+        const float a = nearness_[at(block.x0, block.y0)], b = nearness_[at(block.x1, block.y0)], c = nearness_[at(block.x0, block.y1)], d = nearness_[at(block.x1, block.y1)];
+        const float least = std::min(std::min(a, b), std::min(c, d));
+        if (least == 0) return false;
+        // A step along the view of so many pixels' footprints: z^2 dq is the step, z pixel_ the footprint; orthographic, dz and pixel_.
+        const float allowed = static_cast<float>(flat * pixel_) * (receivers_.camera.orthographic ? 1 : least);
+        const float per_x = block.x1 > block.x0 ? 1.f / static_cast<float>(block.x1 - block.x0) : 0, per_y = block.y1 > block.y0 ? 1.f / static_cast<float>(block.y1 - block.y0) : 0;
+        for (int y = block.y0; y <= block.y1; ++y) {
+            const float t = static_cast<float>(y - block.y0) * per_y, left = a + (c - a) * t, step = (b + (d - b) * t - left) * per_x;
+            const float* row = nearness_.data() + at(block.x0, y);
+            float most = 0;
+            bool all = true;
+            for (int x = 0; x <= block.x1 - block.x0; ++x) {
+                most = std::max(most, std::abs(row[x] - (left + step * static_cast<float>(x))));
+                all &= row[x] != 0;
+            }
+            if (!all || !(most <= allowed)) return false;
+        }
+        return receivers_.normals.empty() || turns_little(block);
+    }
+
+    bool turns_little(const Block& block) const
+    {
+        const DepthVector& first = receivers_.normals[at(block.x0, block.y0)];
+        const float limit = turned * turned;
+        for (int y = block.y0; y <= block.y1; ++y)
+            for (int x = block.x0; x <= block.x1; ++x) {
+                const DepthVector& n = receivers_.normals[at(x, y)];
+                const float dx = n.x - first.x, dy = n.y - first.y, dz = n.z - first.z;
+                if (!(dx * dx + dy * dy + dz * dz <= limit)) return false;
+            }
+        return true;
+    }
+
+    LightPoint light_point(int x, int y) const
+    {
+        const std::size_t pixel = at(x, y);
+        if (receivers_.points.empty()) return field_.point(world_point(receivers_.camera, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth_at(pixel)));
+        const DepthVector& p = receivers_.points[pixel];
+        return field_.point(world_from_camera(receivers_.camera, Vec3(p.x, p.y, p.z)));
+    }
+
+    // Of the way between two corners, a step is `part`.
+    static void widen(ReceiverPatch& patch, std::size_t i, std::size_t j, double part)
+    {
+        const LightPoint &a = patch.corners[i], &b = patch.corners[j];
+        patch.step_x = std::max(patch.step_x, std::abs(b.x - a.x) * part);
+        patch.step_y = std::max(patch.step_y, std::abs(b.y - a.y) * part);
+        patch.step_z = std::max(patch.step_z, std::abs(b.z - a.z) * part);
+    }
+
+    // Whether nothing passes unseen between the block's shaded receivers.
+    bool resolved(const Block& block) const
+    {
+        ReceiverPatch patch{.corners = {light_point(block.x0, block.y0), light_point(block.x1, block.y0), light_point(block.x0, block.y1), light_point(block.x1, block.y1)}};
+        const float least = nearness_[at(block.x0, block.y0)];
+        patch.off = flat * pixel_ * (receivers_.camera.orthographic ? 1 : 1 / static_cast<double>(least));
+        const double part_x = static_cast<double>(block.x1 - block.middle_x()) / (block.x1 - block.x0), part_y = static_cast<double>(block.y1 - block.middle_y()) / (block.y1 - block.y0);
+        if (block.x1 > block.x0) {
+            widen(patch, 0, 1, part_x);
+            widen(patch, 2, 3, part_x);
+        }
+        if (block.y1 > block.y0) {
+            widen(patch, 0, 2, part_y);
+            widen(patch, 1, 3, part_y);
+        }
+        return field_.resolves(patch, most_passed);
+    }
+
+    // Shades what blocks ask for and nobody asked for yet.
+    void ask(const std::vector<Block>& blocks, const std::vector<BlockKind>& kinds)
+    {
+        std::vector<std::uint32_t> pixels;
+        const auto add = [&](int x, int y) {
+            const std::size_t pixel = at(x, y);
+            if (known_[pixel] || nearness_[pixel] == 0) return;
+            known_[pixel] = 1;
+            pixels.push_back(static_cast<std::uint32_t>(pixel));
+        };
+        for (std::size_t i = 0; i < blocks.size(); ++i) {
+            if (kinds[i] != BlockKind::asked) continue;
+            const Block& block = blocks[i];
+            for (const int y : {block.y0, block.middle_y(), block.y1})
+                for (const int x : {block.x0, block.middle_x(), block.x1}) add(x, y);
+        }
+        if (pixels.empty()) return;
+        result_.shaded += pixels.size();
+        const std::vector<float> values = shade_(pixels);
+        for (std::size_t i = 0; i < pixels.size(); ++i)
+            for (std::size_t c = 0; c < channels_; ++c) result_.visibility[pixels[i] * channels_ + c] = values[i * channels_ + c];
+    }
+
+    float value(int x, int y, std::size_t channel) const { return result_.visibility[at(x, y) * channels_ + channel]; }
+
+    // Whether the five middles lie where the corners say.
+    bool told(const Block& block) const
+    {
+        const int x = block.middle_x(), y = block.middle_y();
+        const float u = block.x1 > block.x0 ? static_cast<float>(x - block.x0) / static_cast<float>(block.x1 - block.x0) : 0;
+        const float v = block.y1 > block.y0 ? static_cast<float>(y - block.y0) / static_cast<float>(block.y1 - block.y0) : 0;
+        for (std::size_t k = 0; k < channels_; ++k) {
+            const float a = value(block.x0, block.y0, k), b = value(block.x1, block.y0, k), c = value(block.x0, block.y1, k), d = value(block.x1, block.y1, k);
+            const float top = a + (b - a) * u, bottom = c + (d - c) * u, left = a + (c - a) * v, right = b + (d - b) * v;
+            const float most = std::max({std::abs(value(x, block.y0, k) - top), std::abs(value(x, block.y1, k) - bottom), std::abs(value(block.x0, y, k) - left),
+                                         std::abs(value(block.x1, y, k) - right), std::abs(value(x, y, k) - (top + (bottom - top) * v))});
+            if (!(most <= tolerance_)) return false;
+        }
+        return true;
+    }
+
+    // The parts of the blocks that are to be divided; the others are kept.
+    std::vector<Block> divided(const std::vector<Block>& blocks, const std::vector<BlockKind>& kinds, std::vector<Block>& kept) const
+    {
+        std::vector<std::uint8_t> divides(blocks.size());
+        for_each(blocks, [&](std::size_t i) { divides[i] = kinds[i] == BlockKind::divided || (kinds[i] == BlockKind::asked && !blocks[i].whole() && !told(blocks[i])); });
+        std::vector<Block> parts;
+        for (std::size_t i = 0; i < blocks.size(); ++i) {
+            const Block& block = blocks[i];
+            if (!divides[i]) {
+                if (kinds[i] == BlockKind::asked && !block.whole()) kept.push_back(block);
+                continue;
+            }
+            const int x = block.middle_x(), y = block.middle_y();
+            const bool wide = block.x1 - block.x0 > 1, high = block.y1 - block.y0 > 1;
+            parts.push_back({block.x0, block.y0, wide ? x : block.x1, high ? y : block.y1});
+            if (wide) parts.push_back({x, block.y0, block.x1, high ? y : block.y1});
+            if (high) parts.push_back({block.x0, y, wide ? x : block.x1, block.y1});
+            if (wide && high) parts.push_back({x, y, block.x1, block.y1});
+        }
+        return parts;
+    }
+
+    // Gives the pixels of a block that were not shaded what lies between those that were. Its last column and row are the next block's, but for the
+    // image's own.
+    void interpolate(const Block& block)
+    {
+        const int xs[3] = {block.x0, block.middle_x(), block.x1}, ys[3] = {block.y0, block.middle_y(), block.y1};
+        for (int j = 0; j < 2; ++j)
+            for (int i = 0; i < 2; ++i) fill({xs[i], ys[j], xs[i + 1], ys[j + 1]});
+    }
+
+    void fill(const Block& part)
+    {
+        const int end_x = part.x1 == receivers_.width - 1 ? part.x1 + 1 : part.x1, end_y = part.y1 == receivers_.height - 1 ? part.y1 + 1 : part.y1;
+        const float per_x = part.x1 > part.x0 ? 1.f / static_cast<float>(part.x1 - part.x0) : 0, per_y = part.y1 > part.y0 ? 1.f / static_cast<float>(part.y1 - part.y0) : 0;
+        for (int y = part.y0; y < end_y; ++y)
+            for (int x = part.x0; x < end_x; ++x) {
+                if (known_[at(x, y)]) continue;
+                const float u = static_cast<float>(x - part.x0) * per_x, v = static_cast<float>(y - part.y0) * per_y;
+                for (std::size_t k = 0; k < channels_; ++k) {
+                    const float a = value(part.x0, part.y0, k), b = value(part.x1, part.y0, k), c = value(part.x0, part.y1, k), d = value(part.x1, part.y1, k);
+                    const float top = a + (b - a) * u, bottom = c + (d - c) * u;
+                    result_.visibility[at(x, y) * channels_ + k] = top + (bottom - top) * v;
+                }
+            }
+    }
+
+    const ReceiverImage& receivers_;
+    std::size_t channels_;
+    float tolerance_;
+    const OccluderField& field_;
+    const ShadePixels& shade_;
+    double pixel_ = 0;            // a pixel's footprint over depth; orthographic: itself
+    std::vector<float> nearness_; // [height][width]
+    std::vector<std::uint8_t> known_;
+    CoarseToFine result_;
+};
+
+} // namespace
+
+CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade)
+{
+    return Shading(receivers, channels, tolerance, field, shade).run();
+}
+
+} // namespace penumbra

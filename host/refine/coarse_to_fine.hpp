@@ -1,0 +1,43 @@
+// A mask computed only where it must be: some receivers of every block are shaded, and the block is divided where they do not tell the others.
+//
+// Visibility is smooth inside a penumbra. Blocks of 16 x 16 pixels are shaded at their corners, the middles of their edges and their centre. A block is
+// divided, down to single pixels, where
+//  - its receivers are not of one smooth surface,
+//  - a silhouette may pass unseen between the shaded ones (occluder_field.hpp),
+//  - one of the five middles differs by more than `tolerance` from what the corners say.
+// Elsewhere pixels lie between the nine.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <penumbra/scene.hpp>
+
+#include "common/depth_walk.h"
+#include "refine/occluder_field.hpp"
+
+namespace penumbra {
+
+// The receivers of a mask, [height][width].
+struct ReceiverImage {
+    const Camera& camera;
+    int width = 0, height = 0;
+    std::span<const float> depth;         // planar; not finite or not positive: no receiver
+    std::span<const DepthVector> points;  // in the camera's coordinates, where they do not lie at the pixels' centres; z = 0: no receiver
+    std::span<const DepthVector> normals; // of unit length, in the camera's coordinates; empty: not known
+};
+
+// Visibility of pixels (y width + x), `channels` values each, in their order.
+using ShadePixels = std::function<std::vector<float>(std::span<const std::uint32_t> pixels)>;
+
+struct CoarseToFine {
+    std::vector<float> visibility;       // [height][width][channels]; 1 where no receiver is
+    std::uint64_t receivers = 0, shaded = 0;
+};
+
+// tolerance: above 0. The same bits whatever the threads, as long as `shade` gives them.
+CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade);
+
+} // namespace penumbra

@@ -1,0 +1,142 @@
+#include "refine/occluder_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace penumbra {
+namespace {
+
+constexpr int finest = 256; // cells a side: larger maps are joined
+constexpr float nothing_low = std::numeric_limits<float>::max(), nothing_high = -nothing_low;
+
+} // namespace
+
+// A patch as cells are asked about it. Its plane is level + slope_xi xi + slope_eta eta, in heights.
+struct OccluderField::Query {
+    double xi_low, xi_high, eta_low, eta_high; // of the patch
+    double low, high;                          // its heights
+    double level, slope_xi, slope_eta, margin;
+    double reach_x, reach_y; // how far a penumbra goes in xi and eta for each height above the receiver
+    double rise;             // that heights above the receiver's must have
+    double plane(double xi, double eta) const { return level + slope_xi * xi + slope_eta * eta; }
+};
+
+OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps) : light_(light), view_(view)
+{
+    const int width = maps.front()->width, height = maps.front()->height;
+    const int joined = (std::max(width, height) + finest - 1) / finest;
+    Level level{.width = (width + joined - 1) / joined, .height = (height + joined - 1) / joined, .low = {}, .high = {}};
+    level.low.assign(static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height), nothing_low);
+    level.high.assign(level.low.size(), nothing_high);
+    for (const DepthMap* map : maps) {
+        precision_ = std::max(precision_, map->precision);
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const float z = map->at(x, y);
+                if (!(z > 0) || !std::isfinite(z)) continue;
+                const float up = static_cast<float>(height_of(z));
+                const std::size_t cell = static_cast<std::size_t>(y / joined) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x / joined);
+                level.low[cell] = std::min(level.low[cell], up);
+                level.high[cell] = std::max(level.high[cell], up);
+            }
+    }
+    levels_.push_back(std::move(level));
+    while (levels_.back().width > 1 || levels_.back().height > 1) add_level();
+}
+
+void OccluderField::add_level()
+{
+    const Level& below = levels_.back();
+    Level level{.width = (below.width + 1) / 2, .height = (below.height + 1) / 2, .low = {}, .high = {}};
+    level.low.assign(static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height), nothing_low);
+    level.high.assign(level.low.size(), nothing_high);
+    for (int y = 0; y < below.height; ++y)
+        for (int x = 0; x < below.width; ++x) {
+            const std::size_t from = static_cast<std::size_t>(y) * static_cast<std::size_t>(below.width) + static_cast<std::size_t>(x);
+            const std::size_t to = static_cast<std::size_t>(y / 2) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x / 2);
+            level.low[to] = std::min(level.low[to], below.low[from]);
+            level.high[to] = std::max(level.high[to], below.high[from]);
+        }
+    levels_.push_back(std::move(level));
+}
+
+LightPoint OccluderField::point(const Vec3& world) const
+{
+    const Vec3 to = world - view_.frame.origin;
+    const double x = to.dot(view_.frame.x), y = to.dot(view_.frame.y), z = -to.dot(view_.frame.z);
+    const double spread = view_.orthographic ? 1 : z;
+    return {x, y, z, x / (spread * view_.half_extent.x), y / (spread * view_.half_extent.y)};
+}
+
+bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
+{
+    const auto& c = patch.corners;
+    Query query{};
+    query.xi_low = query.eta_low = query.low = std::numeric_limits<double>::max();
+    query.xi_high = query.eta_high = query.high = -query.xi_low;
+    double z_low = query.xi_low, up[4];
+    for (int i = 0; i < 4; ++i) {
+        if (!(c[i].z > 0)) return false;
+        up[i] = height_of(c[i].z);
+        query.xi_low = std::min(query.xi_low, c[i].xi);
+        query.xi_high = std::max(query.xi_high, c[i].xi);
+        query.eta_low = std::min(query.eta_low, c[i].eta);
+        query.eta_high = std::max(query.eta_high, c[i].eta);
+        query.low = std::min(query.low, up[i]);
+        query.high = std::max(query.high, up[i]);
+        z_low = std::min(z_low, c[i].z);
+    }
+
+    const double ax = c[1].xi - c[0].xi, ay = c[1].eta - c[0].eta, bx = c[2].xi - c[0].xi, by = c[2].eta - c[0].eta;
+    const double area = ax * by - ay * bx;
+    if (!(std::abs(area) > 1e-6 * (ax * ax + ay * ay + bx * bx + by * by))) return false; // edge-on to the light
+    query.slope_xi = ((up[1] - up[0]) * by - (up[2] - up[0]) * ay) / area;
+    query.slope_eta = ((up[2] - up[0]) * ax - (up[1] - up[0]) * bx) / area;
+    query.level = up[0] - query.slope_xi * c[0].xi - query.slope_eta * c[0].eta;
+    const double off = view_.orthographic ? patch.off : patch.off / (z_low * z_low);
+    const double size = std::max(std::abs(query.low), std::abs(query.high));
+    query.margin = off + std::abs(query.plane(c[3].xi, c[3].eta) - up[3]) + (4 * precision_ + 1e-6) * size;
+
+    // Back-projections move by (step + tangent x step_z) z_o / (z_p - z_o) on the light.
+    double lateral_x = 0, lateral_y = 0;
+    for (const LightPoint& p : c) {
+        lateral_x = std::max(lateral_x, view_.orthographic ? 0 : std::abs(p.xi) * view_.half_extent.x);
+        lateral_y = std::max(lateral_y, view_.orthographic ? 0 : std::abs(p.eta) * view_.half_extent.y);
+    }
+    const double tangent_u = view_.orthographic ? light_.half_u : light_.half_u / z_low, tangent_v = view_.orthographic ? light_.half_v : light_.half_v / z_low;
+    const double moved_x = patch.step_x + (lateral_x + tangent_u) * patch.step_z, moved_y = patch.step_y + (lateral_y + tangent_v) * patch.step_z;
+    const double per = view_.orthographic ? 1 : query.high;
+    query.rise = std::max(moved_x / light_.half_u, moved_y / light_.half_v) * per / (2 * share);
+    query.reach_x = light_.half_u / view_.half_extent.x;
+    query.reach_y = light_.half_v / view_.half_extent.y;
+    return cell_resolved(query, levels_.size() - 1, 0, 0);
+}
+
+bool OccluderField::cell_resolved(const Query& query, std::size_t level, int x, int y) const
+{
+    const Level& cells = levels_[level];
+    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(cells.width) + static_cast<std::size_t>(x);
+    const double low = cells.low[at], high = cells.high[at];
+    if (!(high > query.low)) return true; // nothing, or behind every receiver
+
+    // In the light's view a cell of the finest level has this size; the last ones may be cut off, which is no matter.
+    const double side_x = 2.0 / levels_.front().width, side_y = 2.0 / levels_.front().height, cell = std::ldexp(1.0, static_cast<int>(level));
+    const double left = x * cell * side_x - 1, right = left + cell * side_x, top = 1 - y * cell * side_y, bottom = top - cell * side_y;
+    const double reach_x = (high - query.low) * query.reach_x, reach_y = (high - query.low) * query.reach_y;
+    if (left - reach_x > query.xi_high || right + reach_x < query.xi_low || bottom - reach_y > query.eta_high || top + reach_y < query.eta_low) return true;
+
+    const double middle = query.plane(0.5 * (left + right), 0.5 * (top + bottom));
+    const double half = 0.5 * (std::abs(query.slope_xi) * (right - left) + std::abs(query.slope_eta) * (top - bottom));
+    const double plane_high = middle + half + query.margin, plane_low = middle - half - query.margin;
+    if (high <= (level == 0 ? plane_high : plane_low)) return true; // the patch's own surface, or below it
+    if (low > plane_high && low >= query.high + query.rise) return true;
+    if (level == 0) return false;
+    const Level& below = levels_[level - 1];
+    for (int j = 2 * y; j < std::min(2 * y + 2, below.height); ++j)
+        for (int i = 2 * x; i < std::min(2 * x + 2, below.width); ++i)
+            if (!cell_resolved(query, level - 1, i, j)) return false;
+    return true;
+}
+
+} // namespace penumbra

@@ -1,0 +1,55 @@
+// What casts, as far as interpolating between receivers must know it: where in the light's view something lies, and between which depths.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include <penumbra/scene.hpp>
+
+#include "scene/light_space.hpp"
+
+namespace penumbra {
+
+// A receiver in light space, scene units, and where the light's view shows it, -1 to 1.
+struct LightPoint {
+    double x = 0, y = 0, z = 0;
+    double xi = 0, eta = 0;
+};
+
+// Receivers close together on one surface.
+struct ReceiverPatch {
+    std::array<LightPoint, 4> corners{};       // two of one row, then two of another
+    double off = 0;                            // how far the surface may lie from the plane through them, scene units
+    double step_x = 0, step_y = 0, step_z = 0; // from one shaded receiver to the next along light space's axes, at the most, scene units
+};
+
+class OccluderField {
+public:
+    // maps: planar depth in `view`, the light's own, all of one size. A texel is full from its least depth to its greatest.
+    OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps);
+
+    // Whether the penumbra of everything that casts on the patch is at least 1 / `share` steps wide: from one shaded receiver to the next the
+    // back-projection of what casts moves by at most that share of the light, so that nothing passes unseen between the two.
+    bool resolves(const ReceiverPatch& patch, double share) const;
+
+    LightPoint point(const Vec3& world) const;
+
+private:
+    // Heights grow towards the light and are linear over a plane's image: 1 / z, orthographic -z.
+    struct Level {
+        int width = 0, height = 0;
+        std::vector<float> low, high; // least and greatest in a cell; none: low > high
+    };
+    struct Query;
+    double height_of(double z) const { return view_.orthographic ? -z : 1 / z; }
+    bool cell_resolved(const Query& query, std::size_t level, int x, int y) const;
+    void add_level();
+
+    LightFrame light_;
+    Camera view_;
+    double precision_ = 0;
+    std::vector<Level> levels_; // the finest first, the last of one cell
+};
+
+} // namespace penumbra
