@@ -20,7 +20,7 @@
 #define JOINED_RIGHT 2
 #define JOINED_BOTTOM 4
 #define JOINED_TOP 8
-#define FULL 16  // every texel is there, and joined to those beside it
+#define FULL 16  // every texel is there, covered whole, and joined to those beside it
 #define SOLID 32 // so is all around it, as far as it is wide, without bending much: nobody sees its outline
 
 // Levels of patches above the texels: the last has 64 x 64 of them.
@@ -66,19 +66,84 @@ inline float disparity_at(__global const float2* texels, const int2 size, const 
     return x >= 0 && y >= 0 && x < size.x && y < size.y ? texels[y * size.x + x].x : 0.0f;
 }
 
+// surfaces_of_texels: a larger map at a lower resolution, the nearest surface of each texel alone: what it covers of the texel, as a rectangle.
+//
+//   gap    steps of disparity up to which samples are of one surface
+//   texels [size.y][size.x]  (mean disparity, covered share)
+//   parts  [size.y][size.x]  the rectangle: left, right, top, bottom, as Patch has them
+//
+// It lies where the covered samples do and has their share of the texel as its area. Means of different surfaces would be none of them.
+__kernel void surfaces_of_texels(const int2 from, __global const float* restrict depth, const int2 size, const float gap, __global float2* restrict texels,
+                                 __global float4* restrict parts)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    // The samples whose centres lie in the texel.
+    const int2 first = (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y));
+    const int2 last = (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y));
+    float nearest = 0.0f;
+    for (int j = first.y; j < last.y; ++j)
+        for (int i = first.x; i < last.x; ++i) nearest = fmax(nearest, disparity_of(depth[j * from.x + i]));
+    // The nearest surface: from the nearest sample on, as long as the next is no more than `gap` behind.
+    float least = nearest, before = MAXFLOAT;
+    while (least < before) {
+        before = least;
+        for (int j = first.y; j < last.y; ++j)
+            for (int i = first.x; i < last.x; ++i) {
+                const float d = disparity_of(depth[j * from.x + i]);
+                least = d > 0.0f && d >= before - gap && d < least ? d : least;
+            }
+    }
+
+    int count = 0;
+    float sum = 0.0f;
+    int2 low = last, high = first, places = (int2)(0);
+    for (int j = first.y; j < last.y; ++j)
+        for (int i = first.x; i < last.x; ++i) {
+            const float d = disparity_of(depth[j * from.x + i]);
+            if (!(d > 0.0f && d >= least)) continue;
+            ++count;
+            sum += d;
+            low = min(low, (int2)(i, j));
+            high = max(high, (int2)(i + 1, j + 1));
+            places += (int2)(2 * i + 1, 2 * j + 1);
+        }
+    const int at = y * size.x + x;
+    texels[at] = (float2)(0.0f);
+    parts[at] = (float4)(0.0f);
+    if (count == 0) return;
+    const float2 whole = convert_float2(last - first);
+    float2 begin = convert_float2(low - first) / whole, end = convert_float2(high - first) / whole;
+    const float share = count / (whole.x * whole.y);
+    const float2 wide = end - begin;
+    // The box of the samples may hold more: cut off on the side that has fewer.
+    const float2 off = (0.5f * convert_float2(places) / count - convert_float2(first)) / whole - 0.5f * (begin + end);
+    const float missing = wide.x * wide.y - share;
+    if (missing > 0.0f) {
+        const bool across = fabs(off.x) * wide.y >= fabs(off.y) * wide.x;
+        if (across && off.x >= 0.0f) begin.x += missing / wide.y;
+        if (across && off.x < 0.0f) end.x -= missing / wide.y;
+        if (!across && off.y >= 0.0f) begin.y += missing / wide.x;
+        if (!across && off.y < 0.0f) end.y -= missing / wide.x;
+    }
+    texels[at] = (float2)(sum / count, share);
+    parts[at] = (float4)(begin.x, end.x, begin.y, end.y);
+}
+
 // micro_patches: the patches of a map.
 //
 //   gap            the step of disparity that opens half a texel, across and down
 //   texels, others [height][width]   (disparity, covered share) of the map and of the other side's; has_others: whether there is one
+//   parts [height][width]            of surfaces_of_texels, where has_parts; else texels are covered whole
 //   patches [height][width]
-__kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, __global const float2* restrict texels,
-                            __global const float2* restrict others, __global Patch* restrict patches)
+__kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, const int has_parts, __global const float2* restrict texels,
+                            __global const float2* restrict others, __global const float4* restrict parts, __global Patch* restrict patches)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
     const int at = y * size.x + x;
     const float d = texels[at].x;
-    Patch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0};
+    Patch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
     if (d > 0.0f) {
         const float other = has_others ? others[at].x : 0.0f, middle = other > 0.0f ? 0.5f * (d + other) : d;
         float row[5], column[5];
@@ -100,6 +165,14 @@ __kernel void micro_patches(const int2 size, const float precision, const float2
         patch.flags = FULL | (is_one(row[3], d, row[1], row[0], precision, gap.x) ? JOINED_LEFT : 0) | (is_one(row[1], d, row[3], row[4], precision, gap.x) ? JOINED_RIGHT : 0)
                       | (is_one(column[3], d, column[1], column[0], precision, gap.y) ? JOINED_TOP : 0)
                       | (is_one(column[1], d, column[3], column[4], precision, gap.y) ? JOINED_BOTTOM : 0);
+        if (has_parts) {
+            const float4 part = parts[at];
+            patch.x0 = part.s0;
+            patch.x1 = part.s1;
+            patch.y0 = part.s2;
+            patch.y1 = part.s3;
+            if (part.s0 > 0.0f || part.s1 < 1.0f || part.s2 > 0.0f || part.s3 < 1.0f) patch.flags &= ~FULL;
+        }
     }
     patches[at] = patch;
 }
@@ -112,7 +185,7 @@ __kernel void joined_patches(const int2 below_size, const int2 size, const int b
     __global const Patch* const below = patches + below_begin;
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-    Patch all = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0};
+    Patch all = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
     const int right = min(2 * x + 1, below_size.x - 1), bottom = min(2 * y + 1, below_size.y - 1);
     const Patch a = below[2 * y * below_size.x + 2 * x], b = below[2 * y * below_size.x + right], c = below[bottom * below_size.x + 2 * x],
                 d = below[bottom * below_size.x + right];
@@ -248,10 +321,10 @@ inline Along edge_of(const Along along, const int joined)
 
 inline Rectangle rectangle_of(const Patch p, const int x, const int y, const float2 cell)
 {
-    const Rectangle rectangle = {x * cell.x - 1.0f,
-                                 (x + 1) * cell.x - 1.0f,
-                                 1.0f - (y + 1) * cell.y,
-                                 1.0f - y * cell.y,
+    const Rectangle rectangle = {(x + p.x0) * cell.x - 1.0f,
+                                 (x + p.x1) * cell.x - 1.0f,
+                                 1.0f - (y + p.y1) * cell.y,
+                                 1.0f - (y + p.y0) * cell.y,
                                  p.middle,
                                  edge_of(p.left, p.flags & JOINED_LEFT),
                                  edge_of(p.right, p.flags & JOINED_RIGHT),

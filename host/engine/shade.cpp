@@ -132,15 +132,13 @@ opencl::Specialisation program_of(const PreparedTechnique& data)
 void clip(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, const cl::Buffer& visibility)
 {
     work.stage("clip at horizon");
-    Horizon horizon{.light = state.light, .camera = receivers.camera, .width = receivers.width, .height = receivers.height, .points = {}, .depth = {}, .normals = receivers.normals->memory()};
-    opencl::Buffer<DepthVector> points;
-    opencl::Buffer<float> depth;
-    if (receivers.surface || receivers.chosen)
-        points = work.upload(std::span<const DepthVector>(receivers.surface ? receivers.surface->points : receivers.chosen->points), "receiver points");
-    else
-        depth = work.upload(std::span<const float>(receivers.depth->depth), "receiver depth");
-    horizon.points = points.memory();
-    horizon.depth = depth.memory();
+    const Horizon horizon{.light = state.light,
+                          .camera = receivers.camera,
+                          .width = receivers.width,
+                          .height = receivers.height,
+                          .points = receivers.device_points ? receivers.device_points->memory() : cl::Buffer(),
+                          .depth = receivers.device_depth,
+                          .normals = receivers.normals->memory()};
     clip_at_horizon(work, program_of(state.data), horizon, state.channels, visibility);
 }
 
@@ -161,16 +159,23 @@ Image shade_image(opencl::Work& work, const Prepared::State& state, const ToShad
     const bool on_host = row_of(kind_of(state.technique)).on_host;
     // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
     const bool clips = receivers.normals && !(needs_of(state.technique).depth_images && receivers.surface) && !on_host;
-    opencl::Buffer<DepthVector> normals;
-    if (clips) {
+    const std::vector<DepthVector>* listed = receivers.surface ? &receivers.surface->points : receivers.chosen ? &receivers.chosen->points : nullptr;
+    opencl::Buffer<DepthVector> normals, points;
+    opencl::Buffer<float> depth;
+    if (!on_host) {
         work.stage("upload receivers");
-        normals = work.upload(std::span<const DepthVector>(*receivers.normals), "receiver normals");
+        if (listed)
+            points = work.lend(std::span<const DepthVector>(*listed), "receiver points");
+        else
+            depth = work.lend(std::span<const float>(receivers.depth.depth), "receiver depth");
+        if (clips) normals = work.lend(std::span<const DepthVector>(*receivers.normals), "receiver normals");
     }
     const Receiving receiving{.camera = receivers.camera,
                               .width = receivers.depth.width,
                               .height = receivers.depth.height,
                               .depth = &receivers.depth,
-                              .device_depth = {},
+                              .device_depth = depth.memory(),
+                              .device_points = listed ? &points : nullptr,
                               .surface = receivers.surface,
                               .chosen = receivers.chosen,
                               .normals = clips ? &normals : nullptr,
@@ -335,6 +340,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .height = receivers.height,
                               .depth = nullptr,
                               .device_depth = cl::Buffer(receivers.depth, true),
+                              .device_points = nullptr,
                               .surface = nullptr,
                               .chosen = nullptr,
                               .normals = nullptr,

@@ -205,6 +205,27 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::allocate(std::uint64_t bytes,
     }
 }
 
+bool Work::lends(std::size_t bytes) { return bytes > 0 && own_queue_ && context().quirks().host_memory && !context().canaries; }
+
+std::pair<cl::Buffer, std::shared_ptr<void>> Work::lent(const void* data, std::size_t bytes)
+{
+    ensure_stage();
+    stages_[current_].bytes += bytes;
+    // Nobody writes there: OpenCL has no pointer to const.
+    return translated("memory lent to kernels", [&] {
+        cl::Buffer memory(context_->context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, bytes, const_cast<void*>(data));
+        const cl::CommandQueue queue = queue_;
+        std::shared_ptr<void> guard(nullptr, [queue](void*) {
+            try {
+                queue.finish();
+            } catch (...) {
+                // A device that fails now fails the next call too.
+            }
+        });
+        return std::pair{std::move(memory), std::move(guard)};
+    });
+}
+
 void Work::write(const cl::Buffer& memory, const void* data, std::size_t bytes)
 {
     if (bytes == 0) return;

@@ -75,6 +75,13 @@ public:
         write(buffer.memory(), data.data(), data.size_bytes());
         return buffer;
     }
+    // The caller's own memory, for kernels to read. It has to outlive the buffer, which waits for them. Where the device has memory of its own: uploaded.
+    template <class T> Buffer<T> lend(std::span<const T> data, const char* what)
+    {
+        if (!lends(data.size_bytes())) return upload(data, what);
+        auto [memory, guard] = lent(data.data(), data.size_bytes());
+        return Buffer<T>(std::move(memory), data.size(), std::move(guard));
+    }
     // All elements, or those from `first` on.
     template <class T> std::vector<T> read(const Buffer<T>& buffer, std::size_t first = 0)
     {
@@ -127,6 +134,8 @@ private:
     // Throws Stopped: what kernels left out is not there.
     void check_stop() const;
     std::pair<cl::Buffer, std::shared_ptr<void>> allocate(std::uint64_t bytes, const char* what);
+    bool lends(std::size_t bytes);
+    std::pair<cl::Buffer, std::shared_ptr<void>> lent(const void* data, std::size_t bytes);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset);
     void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "depth_image/depth_image.hpp"
 #include "scene/camera.hpp"
@@ -15,7 +16,8 @@ constexpr int coarsest = 16;         // pixels along a block's side
 constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
 constexpr float turned = 0.15f;      // how far its normals may turn, in radians
 constexpr double most_passed = 0.25; // of the light, from one shaded receiver to the next
-constexpr int many_blocks = 64;      // that a thread takes at once
+constexpr std::size_t many_blocks = 128; // that a thread takes at once
+constexpr int rows_together = 64;
 
 // A block of receivers, its last column and row included: neighbours share theirs.
 struct Block {
@@ -37,7 +39,9 @@ public:
         result_.visibility.assign(count * channels_, 1.f);
         known_.assign(count, 0);
         nearness_.resize(count);
-        parallel_for(receivers.height, [&](int y) { measure_row(y); });
+        parallel_for((receivers.height + rows_together - 1) / rows_together, [&](int group) {
+            for (int y = group * rows_together; y < std::min(receivers.height, (group + 1) * rows_together); ++y) measure_row(y);
+        });
         pixel_ = 2 * std::max(receivers.camera.half_extent.x / receivers.width, receivers.camera.half_extent.y / receivers.height);
     }
 
@@ -49,11 +53,10 @@ public:
             ask(blocks, kinds);
             blocks = divided(blocks, kinds, kept);
         }
-        parallel_for(static_cast<int>((kept.size() + many_blocks - 1) / many_blocks), [&](int group) {
-            const std::size_t from = static_cast<std::size_t>(group) * many_blocks, to = std::min(kept.size(), from + many_blocks);
-            for (std::size_t i = from; i < to; ++i) interpolate(kept[i]);
-        });
-        for (const float nearness : nearness_) result_.receivers += nearness != 0;
+        for_each(kept, [&](std::size_t i) { interpolate(kept[i]); });
+        std::uint64_t count = 0;
+        for (const float nearness : nearness_) count += nearness != 0;
+        result_.receivers = count;
         return std::move(result_);
     }
 
@@ -64,10 +67,13 @@ private:
     // What is linear over a plane's image: 1 / z, of an orthographic camera z. 0: no receiver.
     void measure_row(int y)
     {
-        const bool orthographic = receivers_.camera.orthographic;
-        for (int x = 0; x < receivers_.width; ++x) {
-            const float z = static_cast<float>(depth_at(at(x, y)));
-            nearness_[at(x, y)] = z > 0 && std::isfinite(z) ? (orthographic ? z : 1 / z) : 0;
+        constexpr float most = std::numeric_limits<float>::max();
+        const bool orthographic = receivers_.camera.orthographic, given = receivers_.points.empty();
+        const std::size_t begin = at(0, y), end = begin + static_cast<std::size_t>(receivers_.width);
+        for (std::size_t i = begin; i < end; ++i) nearness_[i] = given ? receivers_.depth[i] : receivers_.points[i].z;
+        for (std::size_t i = begin; i < end; ++i) {
+            const float z = nearness_[i], there = z > 0 && z <= most ? z : 0, up = 1 / (there > 0 ? there : 1);
+            nearness_[i] = orthographic || there == 0 ? there : up;
         }
     }
 
@@ -80,12 +86,16 @@ private:
         return blocks;
     }
 
-    template <class Body> void for_each(const std::vector<Block>& blocks, const Body& body) const
+    template <class Body> static void for_each(const std::vector<Block>& blocks, const Body& body)
     {
-        parallel_for(static_cast<int>((blocks.size() + many_blocks - 1) / many_blocks), [&](int group) {
-            const std::size_t from = static_cast<std::size_t>(group) * many_blocks, to = std::min(blocks.size(), from + many_blocks);
-            for (std::size_t i = from; i < to; ++i) body(i);
-        });
+        const auto some = [&](std::size_t from) {
+            for (std::size_t i = from; i < std::min(blocks.size(), from + many_blocks); ++i) body(i);
+        };
+        // Threads take longer to start than a few blocks.
+        if (blocks.size() <= 2 * many_blocks)
+            for (std::size_t from = 0; from < blocks.size(); from += many_blocks) some(from);
+        else
+            parallel_for(static_cast<int>((blocks.size() + many_blocks - 1) / many_blocks), [&](int group) { some(static_cast<std::size_t>(group) * many_blocks); });
     }
 
     std::vector<BlockKind> kinds_of(const std::vector<Block>& blocks) const
@@ -121,13 +131,9 @@ private:
         for (int y = block.y0; y <= block.y1; ++y) {
             const float t = static_cast<float>(y - block.y0) * per_y, left = a + (c - a) * t, step = (b + (d - b) * t - left) * per_x;
             const float* row = nearness_.data() + at(block.x0, y);
-            float most = 0;
-            bool all = true;
-            for (int x = 0; x <= block.x1 - block.x0; ++x) {
-                most = std::max(most, std::abs(row[x] - (left + step * static_cast<float>(x))));
-                all &= row[x] != 0;
-            }
-            if (!all || !(most <= allowed)) return false;
+            int off = 0; // counted: compilers do that in vectors
+            for (int x = 0; x <= block.x1 - block.x0; ++x) off += !(std::abs(row[x] - (left + step * static_cast<float>(x))) <= allowed) || row[x] == 0;
+            if (off > 0) return false;
         }
         return receivers_.normals.empty() || turns_little(block);
     }
@@ -135,13 +141,15 @@ private:
     bool turns_little(const Block& block) const
     {
         const DepthVector& first = receivers_.normals[at(block.x0, block.y0)];
-        const float limit = turned * turned;
-        for (int y = block.y0; y <= block.y1; ++y)
-            for (int x = block.x0; x <= block.x1; ++x) {
-                const DepthVector& n = receivers_.normals[at(x, y)];
-                const float dx = n.x - first.x, dy = n.y - first.y, dz = n.z - first.z;
-                if (!(dx * dx + dy * dy + dz * dz <= limit)) return false;
+        for (int y = block.y0; y <= block.y1; ++y) {
+            const DepthVector* row = receivers_.normals.data() + at(block.x0, y);
+            int off = 0;
+            for (int x = 0; x <= block.x1 - block.x0; ++x) {
+                const float dx = row[x].x - first.x, dy = row[x].y - first.y, dz = row[x].z - first.z;
+                off += !(dx * dx + dy * dy + dz * dz <= turned * turned);
             }
+            if (off > 0) return false;
+        }
         return true;
     }
 
@@ -224,12 +232,10 @@ private:
     // The parts of the blocks that are to be divided; the others are kept.
     std::vector<Block> divided(const std::vector<Block>& blocks, const std::vector<BlockKind>& kinds, std::vector<Block>& kept) const
     {
-        std::vector<std::uint8_t> divides(blocks.size());
-        for_each(blocks, [&](std::size_t i) { divides[i] = kinds[i] == BlockKind::divided || (kinds[i] == BlockKind::asked && !blocks[i].whole() && !told(blocks[i])); });
         std::vector<Block> parts;
         for (std::size_t i = 0; i < blocks.size(); ++i) {
             const Block& block = blocks[i];
-            if (!divides[i]) {
+            if (kinds[i] != BlockKind::divided && (kinds[i] == BlockKind::empty || block.whole() || told(block))) {
                 if (kinds[i] == BlockKind::asked && !block.whole()) kept.push_back(block);
                 continue;
             }
@@ -244,28 +250,35 @@ private:
     }
 
     // Gives the pixels of a block that were not shaded what lies between those that were. Its last column and row are the next block's, but for the
-    // image's own.
+    // image's own. What a finer block beside it shaded on its first column and row stays.
     void interpolate(const Block& block)
     {
         const int xs[3] = {block.x0, block.middle_x(), block.x1}, ys[3] = {block.y0, block.middle_y(), block.y1};
         for (int j = 0; j < 2; ++j)
-            for (int i = 0; i < 2; ++i) fill({xs[i], ys[j], xs[i + 1], ys[j + 1]});
+            for (int i = 0; i < 2; ++i)
+                for (std::size_t k = 0; k < channels_; ++k) fill({xs[i], ys[j], xs[i + 1], ys[j + 1]}, j == 0, k);
     }
 
-    void fill(const Block& part)
+    void fill(const Block& part, bool first_row, std::size_t channel)
     {
-        const int end_x = part.x1 == receivers_.width - 1 ? part.x1 + 1 : part.x1, end_y = part.y1 == receivers_.height - 1 ? part.y1 + 1 : part.y1;
+        const int columns = part.x1 - part.x0 + (part.x1 == receivers_.width - 1 ? 1 : 0), rows = part.y1 - part.y0 + (part.y1 == receivers_.height - 1 ? 1 : 0);
+        const float a = value(part.x0, part.y0, channel), b = value(part.x1, part.y0, channel), c = value(part.x0, part.y1, channel), d = value(part.x1, part.y1, channel);
         const float per_x = part.x1 > part.x0 ? 1.f / static_cast<float>(part.x1 - part.x0) : 0, per_y = part.y1 > part.y0 ? 1.f / static_cast<float>(part.y1 - part.y0) : 0;
-        for (int y = part.y0; y < end_y; ++y)
-            for (int x = part.x0; x < end_x; ++x) {
-                if (known_[at(x, y)]) continue;
-                const float u = static_cast<float>(x - part.x0) * per_x, v = static_cast<float>(y - part.y0) * per_y;
-                for (std::size_t k = 0; k < channels_; ++k) {
-                    const float a = value(part.x0, part.y0, k), b = value(part.x1, part.y0, k), c = value(part.x0, part.y1, k), d = value(part.x1, part.y1, k);
-                    const float top = a + (b - a) * u, bottom = c + (d - c) * u;
-                    result_.visibility[at(x, y) * channels_ + k] = top + (bottom - top) * v;
-                }
-            }
+        float line[coarsest + 1];
+        for (int y = 0; y < rows; ++y) {
+            const float v = static_cast<float>(y) * per_y, left = a + (c - a) * v, step = (b + (d - b) * v - left) * per_x;
+            for (int x = 0; x < columns; ++x) line[x] = left + step * static_cast<float>(x);
+            const std::size_t begin = at(part.x0, part.y0 + y);
+            float* const to = result_.visibility.data() + begin * channels_ + channel;
+            // Inside, nobody else has shaded.
+            const bool inside = !(y == 0 && first_row) && part.y0 + y != receivers_.height - 1;
+            const int plain_begin = inside ? std::min(columns, 1) : columns, plain_end = inside && part.x1 == receivers_.width - 1 ? columns - 1 : columns;
+            for (int x = 0; x < plain_begin; ++x)
+                if (!known_[begin + static_cast<std::size_t>(x)]) to[static_cast<std::size_t>(x) * channels_] = line[x];
+            for (int x = plain_begin; x < plain_end; ++x) to[static_cast<std::size_t>(x) * channels_] = line[x];
+            for (int x = std::max(plain_begin, plain_end); x < columns; ++x)
+                if (!known_[begin + static_cast<std::size_t>(x)]) to[static_cast<std::size_t>(x) * channels_] = line[x];
+        }
     }
 
     const ReceiverImage& receivers_;

@@ -32,7 +32,7 @@ DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bo
     const auto upload = [&](const DepthMap& map, const char* what) {
         if (result.uploaded.empty()) work.stage("upload occluders");
         depth.precision = std::max(depth.precision, map.precision);
-        result.uploaded.push_back(work.upload(std::span<const float>(map.depth), what));
+        result.uploaded.push_back(work.lend(std::span<const float>(map.depth), what));
         return result.uploaded.back().memory();
     };
     if (front && from.front) depth.front = upload(*from.front, "front occluder depth");

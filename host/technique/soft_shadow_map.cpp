@@ -39,18 +39,31 @@ void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, Ma
                 side.superblocks);
 }
 
-// A union needs surfaces as they are: the mean of two is none of them.
-Reduction reduction_of(const SoftShadowMap& settings)
+// The step of disparity between two texels that lets half a texel of light through at the most, across and down.
+cl_float2 gap_of(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
+
+// For the union a larger map becomes surfaces with what they cover of each texel: the mean of two surfaces is none of them.
+void reduce_to_surfaces(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from, MapSize size, PreparedSoftShadowMap::Side& side)
 {
-    return settings.visibility == PatchVisibility::united ? Reduction::nearest : settings.reduction;
+    side.map = {.texels = work.buffer<cl_float2>(count_of(size), "occluder texels"), .steps = work.buffer<cl_float2>(count_of(size), "occluder slopes")};
+    side.parts = work.buffer<cl_float4>(count_of(size), "covered parts of texels");
+    const cl_float2 gap = gap_of(prepared.view);
+    work.launch(prepared.program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count_of(size) * 24, dimensions(from), depth, dimensions(size),
+                std::min(gap.s[0], gap.s[1]), side.map.texels, side.parts);
+    work.launch(prepared.program, "slope_steps", grid_of(size), {16, 8}, count_of(size) * 16, dimensions(size), static_cast<float>(prepared.precision), side.map.texels,
+                side.map.steps);
 }
 
 PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
                                          MapSize size)
 {
-    PreparedSoftShadowMap::Side side{
-        .map = occluder_map(work, depth, from, size, reduction_of(prepared.settings), prepared.precision, prepared.program), .patches = {}, .blocks = {}, .superblocks = {}};
-    if (prepared.settings.visibility == PatchVisibility::sum) build_pyramid(work, prepared, size, side);
+    const bool united = prepared.settings.visibility == PatchVisibility::united;
+    PreparedSoftShadowMap::Side side;
+    if (united && count_of(from) > count_of(size))
+        reduce_to_surfaces(work, prepared, depth, from, size, side);
+    else
+        side.map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program);
+    if (!united) build_pyramid(work, prepared, size, side);
     return side;
 }
 
@@ -66,7 +79,8 @@ void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, Prep
     side.patches = work.buffer<Patch>(count, "micro-patches");
     const float precision = static_cast<float>(prepared.precision);
     work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(Patch)), dimensions(size), precision,
-                cl_float2{{prepared.view.light_scale_x * prepared.view.texel_x, prepared.view.light_scale_y * prepared.view.texel_y}}, static_cast<cl_int>(other != nullptr), side.map.texels, other ? other->map.texels.memory() : cl::Buffer(), side.patches);
+                gap_of(prepared.view), static_cast<cl_int>(other != nullptr), static_cast<cl_int>(static_cast<bool>(side.parts)), side.map.texels,
+                other ? other->map.texels.memory() : cl::Buffer(), side.parts, side.patches);
     std::size_t below = 0;
     for (std::size_t level = 1; level < sizes.size(); ++level) {
         const std::size_t begin = below + count_of(sizes[level - 1]);

@@ -6,25 +6,20 @@ ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera
                          const opencl::Specialisation& program)
 {
     work.stage("upload receivers");
-    const auto uploaded = work.upload(std::span<const float>(depth.depth), "receiver depth");
+    const auto uploaded = work.lend(std::span<const float>(depth.depth), "receiver depth");
     work.stage("receivers");
     return receiver_points(work, receiver_view(camera, depth.width, depth.height, view), uploaded.memory(), depth.precision, program);
 }
 
 ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)
 {
-    if (receivers.surface || receivers.chosen) {
-        work.stage("upload receivers");
-        const auto points = work.upload(std::span<const DepthVector>(receivers.surface ? receivers.surface->points : receivers.chosen->points), "receiver points");
-        work.stage("receivers");
-        const ReceiverView view = receiver_view(receivers.camera, receivers.width, receivers.height, receivers.view);
-        ReceiverPoints lifted = lifted_receiver_points(work, view, points, receivers.depth->precision, program);
-        lifted.is_list = receivers.chosen != nullptr;
-        return lifted;
-    }
-    if (receivers.depth) return points_of(work, *receivers.depth, receivers.camera, receivers.view, program);
+    if (receivers.depth) work.stage("receivers");
     const ReceiverView view = receiver_view(receivers.camera, receivers.width, receivers.height, receivers.view);
-    return receiver_points(work, view, receivers.device_depth, 0x1p-24, program);
+    const double precision = receivers.depth ? receivers.depth->precision : 0x1p-24;
+    if (!receivers.device_points) return receiver_points(work, view, receivers.device_depth, precision, program);
+    ReceiverPoints points = lifted_receiver_points(work, view, *receivers.device_points, precision, program);
+    points.is_list = receivers.chosen != nullptr;
+    return points;
 }
 
 ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program)

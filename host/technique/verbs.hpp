@@ -107,7 +107,8 @@ struct Receiving {
     Camera camera;
     int width = 0, height = 0;
     const DepthMap* depth = nullptr;
-    cl::Buffer device_depth; // where there is no `depth`
+    cl::Buffer device_depth;                                 // for techniques of the device, unless there are points
+    const opencl::Buffer<DepthVector>* device_points = nullptr; // what is shaded where pixels' centres are not: lifted, or some pixels
     const DepthSurface* surface = nullptr; // what was fitted to `depth`, where it is somebody else's: lifted points and their normals
     const ChosenReceivers* chosen = nullptr; // where these are some pixels of an image: `depth` and `surface` are theirs, as a list
     // Of each pixel's surface, towards the camera and in its coordinates; null: not known.
@@ -171,8 +172,7 @@ struct DeviceBuffers {
     std::optional<Error> prepare, shade;
 };
 
-// Receiver points of depth that is on the host (uploaded in a stage of its own) or on the device already, for a technique whose `program`
-// has the kernel. The stage "receivers" or the running one is left running.
+// Receiver points, for a technique whose `program` has the kernel. The stage "receivers" is left running, but of a caller's own depth on the device.
 ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
 // The same with the receivers' planes, where their normals are known.
 ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
