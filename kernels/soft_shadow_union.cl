@@ -81,9 +81,21 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
     // The samples whose centres lie in the texel.
     const int2 first = (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y));
     const int2 last = (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y));
-    float nearest = 0.0f;
+    float nearest = 0.0f, furthest = MAXFLOAT, all = 0.0f;
     for (int j = first.y; j < last.y; ++j)
-        for (int i = first.x; i < last.x; ++i) nearest = fmax(nearest, disparity_of(depth[j * from.x + i]));
+        for (int i = first.x; i < last.x; ++i) {
+            const float d = disparity_of(depth[j * from.x + i]);
+            nearest = d > nearest ? d : nearest;
+            furthest = d < furthest ? d : furthest;
+            all += d;
+        }
+    const int at = y * size.x + x;
+    const bool plain = furthest > 0.0f && nearest - furthest <= gap;
+    if (plain || nearest == 0.0f) {
+        texels[at] = plain ? (float2)(all / ((last.x - first.x) * (last.y - first.y)), 1.0f) : (float2)(0.0f);
+        parts[at] = plain ? (float4)(0.0f, 1.0f, 0.0f, 1.0f) : (float4)(0.0f);
+        return;
+    }
     // The nearest surface: from the nearest sample on, as long as the next is no more than `gap` behind.
     float least = nearest, before = MAXFLOAT;
     while (least < before) {
@@ -108,10 +120,6 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
             high = max(high, (int2)(i + 1, j + 1));
             places += (int2)(2 * i + 1, 2 * j + 1);
         }
-    const int at = y * size.x + x;
-    texels[at] = (float2)(0.0f);
-    parts[at] = (float4)(0.0f);
-    if (count == 0) return;
     const float2 whole = convert_float2(last - first);
     float2 begin = convert_float2(low - first) / whole, end = convert_float2(high - first) / whole;
     const float share = count / (whole.x * whole.y);

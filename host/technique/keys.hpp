@@ -43,7 +43,19 @@ SettingKey real_key(std::string_view name, double Settings::*member, RealRange r
             [member](Technique& t, const SettingValue& v) { std::get<Settings>(t).*member = std::get<double>(v); }};
 }
 
-// What every technique has.
+// What every technique has: the settings that the others change. technique_from takes it first, wherever it stands.
+constexpr std::string_view preset_name = "preset";
+template <class Settings> SettingKey preset_key(const Settings& paper)
+{
+    static constexpr std::array<std::string_view, 2> names{"default", "paper"};
+    return {preset_name,
+            "",
+            "what the other keys change: default, the best that was measured, or paper, as published",
+            Choices{{names.begin(), names.end()}},
+            [](const Technique& t) { return SettingValue{std::string(names.at(static_cast<std::size_t>(std::get<Settings>(t).preset)))}; },
+            [paper](Technique& t, const SettingValue& v) { std::get<Settings>(t) = std::get<std::string>(v) == names[1] ? paper : Settings{}; }};
+}
+
 template <class Settings> SettingKey tolerance_key()
 {
     return real_key<Settings>("tolerance", &Settings::tolerance, {0, 1}, "visibility",

@@ -92,6 +92,19 @@ PreparedOcclusionTexture::Part part_of(opencl::Work& work, const opencl::Special
     return prepared;
 }
 
+// As published.
+OcclusionTexture paper_settings()
+{
+    OcclusionTexture settings;
+    settings.preset = Preset::paper;
+    settings.projection_centre = ProjectionCentre::behind_light;
+    settings.prefilter = Prefilter::nbuffer;
+    settings.combine = Combine::product;
+    settings.self_shadow = SelfShadow::fade;
+    settings.tolerance = 0;
+    return settings;
+}
+
 } // namespace
 
 TechniqueRow row(const OcclusionTexture&)
@@ -101,7 +114,8 @@ TechniqueRow row(const OcclusionTexture&)
             .summary = "Slices of the casters, prefiltered: smooth and plausible, at a cost that neither the light's size nor the casters' "
                        "number moves.",
             .source = "Eisemann, Decoret: Occlusion Textures for Plausible Soft Shadows, Computer Graphics Forum 2008",
-            .keys = {integer_key<S>("slices", &S::slices, {1, 64}, "slices", "along the light's axis"),
+            .keys = {preset_key<S>(paper_settings()),
+                 integer_key<S>("slices", &S::slices, {1, 64}, "slices", "along the light's axis"),
                      choice_key<S>("placement", &S::placement, placement_names,
                                    "slices of even depth, of even 1 / depth, or with as much of the casters' area in each"),
                      integer_key<S>("resolution", &S::resolution, {4, 4096}, "texels", "along each side of a slice"),

@@ -153,6 +153,17 @@ std::shared_ptr<const Topology> topology_of(const Casting& casting, const Smooth
     return std::make_shared<const Topology>(meshes);
 }
 
+// As published.
+Smoothie paper_settings()
+{
+    Smoothie settings;
+    settings.preset = Preset::paper;
+    settings.t_from = SmoothieWidth::t;
+    settings.two_sided = false;
+    settings.tolerance = 0;
+    return settings;
+}
+
 } // namespace
 
 TechniqueRow row(const Smoothie&)
@@ -163,7 +174,8 @@ TechniqueRow row(const Smoothie&)
         .summary = "A shadow map with fins at its silhouettes: soft edges that harden at contact, for little more than the map; the "
                    "umbra stays whole.",
         .source = "Chan, Durand: Rendering Fake Soft Shadows with Smoothies, Eurographics Symposium on Rendering 2003",
-        .keys = {choice_key<S>("t_from", &S::t_from, t_from_names, "how wide smoothies are: as half of what the light's size casts, or t"),
+        .keys = {preset_key<S>(paper_settings()),
+                 choice_key<S>("t_from", &S::t_from, t_from_names, "how wide smoothies are: as half of what the light's size casts, or t"),
                  real_key<S>("t", &S::t, {0, 2}, "half widths of the light's image", "the paper's t; with t_from t"),
                  choice_key<S>("silhouettes", &S::silhouettes, silhouettes_names,
                                "edges of the objects that cast, or of the depth map; without objects: of the map"),

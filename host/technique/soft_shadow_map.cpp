@@ -188,6 +188,16 @@ void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, 
     sample_mask(work, points, light_mask.memory(), side, side, shaded.visibility, prepared.program);
 }
 
+// As published.
+SoftShadowMap paper_settings()
+{
+    SoftShadowMap settings;
+    settings.preset = Preset::paper;
+    settings.visibility = PatchVisibility::sum;
+    settings.tolerance = 0;
+    return settings;
+}
+
 } // namespace
 
 TechniqueRow row(const SoftShadowMap&)
@@ -197,7 +207,8 @@ TechniqueRow row(const SoftShadowMap&)
         .kind = "soft_shadow_map",
         .summary = "Micro-patches: every texel of the occluder map is projected back onto the light and its share is summed.",
         .source = "Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion: Soft Shadow Maps, 2006",
-        .keys = {choice_key<S>("visibility", &S::visibility, visibility_names,
+        .keys = {preset_key<S>(paper_settings()),
+                 choice_key<S>("visibility", &S::visibility, visibility_names,
                                "how patches are joined: union hides each of 32 x 32 samples of the light once; sum adds shares up (3.4, 3.5)"),
                  choice_key<S>("sides", &S::sides, sides_names, "which occluder maps are used; both merges them by the larger occlusion"),
                  integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",

@@ -235,6 +235,17 @@ void warn_of_edges(const Topology& topology, std::vector<std::string>& warnings)
     warn(topology.left_out(), " triangles without area were left out");
 }
 
+// As published.
+SoftShadowVolume paper_settings()
+{
+    SoftShadowVolume settings;
+    settings.preset = Preset::paper;
+    settings.overlap = Overlap::sum;
+    settings.light_splits = 1;
+    settings.tolerance = 0;
+    return settings;
+}
+
 } // namespace
 
 TechniqueRow row(const SoftShadowVolume&)
@@ -245,7 +256,8 @@ TechniqueRow row(const SoftShadowVolume&)
         .summary =
             "Penumbra wedges: the hard shadow of the light's centre, corrected around each silhouette edge. Exact for planar casters.",
         .source = "Assarsson: A Real-Time Soft Shadow Volume Algorithm, 2003 (Papers I to V)",
-        .keys = {choice_key<S>("coverage", &S::coverage, coverage_names,
+        .keys = {preset_key<S>(paper_settings()),
+                 choice_key<S>("coverage", &S::coverage, coverage_names,
                                "an edge's share of the light: Paper I's wedge, the closed form, or a table, which textured lights need"),
                  flag_key<S>("smooth", &S::smooth, "linear: light intensity s becomes 3 s^2 - 2 s^3"),
                  integer_key<S>("corner_wedges", &S::corner_wedges, {0, 16}, "wedges",

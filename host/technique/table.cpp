@@ -6,6 +6,7 @@
 #include <penumbra/error.hpp>
 
 #include "scene/joined.hpp"
+#include "technique/keys.hpp"
 #include "technique/techniques.hpp"
 
 namespace penumbra {
@@ -87,14 +88,18 @@ Technique technique_from(const TechniqueRequest& request)
 {
     const TechniqueRow& row = row_of(request.kind);
     Technique technique = row.defaults;
-    for (const auto& [name, value] : request.settings) {
+    const auto take = [&](const std::string& name, const SettingValue& value) {
         const SettingKey& key = key_of(row, name);
         Conversion conversion{value, {}};
         const auto converted = std::visit([&conversion](const auto& domain) { return conversion(domain); }, key.domain);
         if (!converted)
             throw Error::at(ErrorCode::invalid_input, "technique." + name, "is " + text_of(value), "expected " + conversion.expected);
         key.set(technique, *converted);
-    }
+    };
+    for (const auto& [name, value] : request.settings)
+        if (name == preset_name) take(name, value);
+    for (const auto& [name, value] : request.settings)
+        if (name != preset_name) take(name, value);
     return technique;
 }
 

@@ -1,6 +1,8 @@
 // Settings of occlusion_texture.
 #pragma once
 
+#include <penumbra/technique/preset.hpp>
+
 namespace penumbra {
 
 enum class Placement { uniform, reciprocal, occupied };
@@ -14,6 +16,7 @@ enum class LevelStorage { binary32, normalized16 };
 // light, each a picture that is prefiltered; a receiver looks each slice between it and the light up once. Cost does not depend on the
 // light's size and hardly on the casters.
 struct OcclusionTexture {
+    Preset preset = Preset::best; // what the other settings started from
     int slices = 16; // 3.4
     Placement placement =
         Placement::uniform; // of the slices along the light's axis: even in depth (3.4), in its reciprocal, or in the casters' area

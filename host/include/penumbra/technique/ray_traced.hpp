@@ -3,10 +3,13 @@
 
 #include <cstdint>
 
+#include <penumbra/technique/preset.hpp>
+
 namespace penumbra {
 
 // Shadow rays (Embree) through the scene's objects: the reference. Stratified over the light and seeded.
 struct RayTraced {
+    Preset preset = Preset::best; // what the other settings started from
     int samples = 256;     // rays a receiver
     bool adaptive = false; // `first_samples` rays everywhere, the rest only around receivers whose visibility is not settled
     int first_samples = 16;

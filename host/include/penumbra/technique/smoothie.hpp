@@ -1,6 +1,8 @@
 // Settings of smoothie.
 #pragma once
 
+#include <penumbra/technique/preset.hpp>
+
 namespace penumbra {
 
 enum class SmoothieWidth { light, t };
@@ -10,6 +12,7 @@ enum class Falloff { sinusoidal, linear };
 // Smoothies (Chan, Durand, Rendering Fake Soft Shadows with Smoothies, 2003): a shadow map whose silhouettes wear fins that fade to light
 // outwards.
 struct Smoothie {
+    Preset preset = Preset::best; // what the other settings started from
     SmoothieWidth t_from =
         SmoothieWidth::light; // light: a smoothie is as wide as the outer half of the penumbra that the light's size casts
     double t = 0.05;          // t_from t: the paper's t, where the light's image is 2 wide along its wider side

@@ -1,6 +1,8 @@
 // Settings of soft_shadow_map.
 #pragma once
 
+#include <penumbra/technique/preset.hpp>
+
 namespace penumbra {
 
 enum class Sides { front, back, both };
@@ -11,6 +13,7 @@ enum class PatchVisibility { sum, united };
 // Soft Shadow Maps (Atty, Holzschuch, Lapierre, Hasenfratz, Hansen, Sillion 2006): each texel of the occluder map is a micro-patch
 // parallel to the light; its back-projection hides a share of the light.
 struct SoftShadowMap {
+    Preset preset = Preset::best; // what the other settings started from
     // united (`union` in scene files): which of 32 x 32 samples of the light the patches of all maps hide, each once. sum: the paper's, the shares
     // added up, and of two maps the larger.
     PatchVisibility visibility = PatchVisibility::sum;

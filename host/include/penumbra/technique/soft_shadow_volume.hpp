@@ -1,6 +1,8 @@
 // Settings of soft_shadow_volume.
 #pragma once
 
+#include <penumbra/technique/preset.hpp>
+
 namespace penumbra {
 
 enum class Coverage { linear, analytic, texture };
@@ -12,6 +14,7 @@ enum class WedgeCulling { none, loose, far_depth, tight };
 // Soft Shadow Volumes (Assarsson, A Real-Time Soft Shadow Volume Algorithm, 2003): the hard shadow of the light's centre, corrected inside
 // the penumbra wedge of each silhouette edge. Exact for a caster whose silhouette is the same from all of the light, as of a planar one.
 struct SoftShadowVolume {
+    Preset preset = Preset::best; // what the other settings started from
     Coverage coverage = Coverage::analytic; // how an edge's share of the light is found (Papers I, IV, III)
     bool smooth = false;                    // linear: s' = 3 s^2 - 2 s^3 (Paper I, 4.2)
     int corner_wedges = 0;                  // linear: extra wedges at a corner of 0 degrees, fewer up to a right angle (Paper I, Fig. 7)
