@@ -33,17 +33,26 @@ inline bool is_one(const float before, const float a, const float b, const float
     return a > 0.0f && b > 0.0f && (fabs(b - a) <= gap || is_joined(before, a, b, after, precision));
 }
 
-// The disparity of the edge between a texel (d) and the one beside it. inner, outer: the texels on either side, with those behind them; middle: halfway
-// between the front and the back of what the texel shows.
+// What a texel's edges are found from: its own disparity and that of the other side of the body, the own one where there is none.
+typedef struct {
+    float d, other, precision;
+} Rim;
+
+// The disparity of the edge between a texel and the one beside it. inner, outer: the texels on either side, with those behind them; outwards: whether
+// the edge is the texel's one away from the light's axis.
 //
-// Shared with a neighbour of the same surface it is the mean of the two. At a silhouette the surface falls off towards its rim: a round one as a square
-// root, of which the last texel's middle shows the slope; it ends where front and back meet.
-inline float edge_disparity(const float behind_inner, const float inner, const float d, const float outer, const float behind_outer, const float middle,
-                            const float precision, const float gap)
+// Shared with a neighbour of the same surface it is the mean of the two. At a silhouette a surface that falls off towards its rim does so as a square
+// root, of which the last texel's middle shows the slope; it ends where front and back meet. One that does not fall off ends at a corner: the light's
+// centre sees past the nearer one where the edge points away from its axis, past the further one where it points towards it.
+inline float edge_disparity(const Rim rim, const float behind_inner, const float inner, const float outer, const float behind_outer, const bool outwards, const float gap)
 {
-    if (is_one(inner, d, outer, behind_outer, precision, gap)) return 0.5f * (d + outer);
-    if (!is_one(behind_inner, inner, d, outer, precision, gap)) return middle;
-    const float slope = d - inner, towards = middle - d;
+    const float d = rim.d;
+    if (is_one(inner, d, outer, behind_outer, rim.precision, gap)) return 0.5f * (d + outer);
+    const float middle = 0.5f * (d + rim.other), towards = middle - d;
+    if (!is_one(behind_inner, inner, d, outer, rim.precision, gap)) return middle;
+    const float slope = d - inner;
+    const bool flat = fabs(slope) < 0.25f * fabs(towards), thin = fabs(rim.other - d) <= gap;
+    if (flat && thin) return outwards ? fmax(d, rim.other) : fmin(d, rim.other);
     // Away from where front and back meet it is no rim but the plane's own slope.
     if (slope * towards <= 0.0f) return fmax(fma(0.5f, slope, d), 0.5f * d);
     return towards < 0.0f ? fmax(fma(1.4f, slope, d), middle) : fmin(fma(1.4f, slope, d), middle);
@@ -52,6 +61,12 @@ inline float edge_disparity(const float behind_inner, const float inner, const f
 inline Along alone(const float d)
 {
     const Along along = {d, d};
+    return along;
+}
+
+inline Along none()
+{
+    const Along along = {MAXFLOAT, -MAXFLOAT};
     return along;
 }
 
@@ -66,11 +81,24 @@ inline float disparity_at(__global const float2* texels, const int2 size, const 
     return x >= 0 && y >= 0 && x < size.x && y < size.y ? texels[y * size.x + x].x : 0.0f;
 }
 
+// The rectangle inside a box that has a share of the texel as its area, cut off where less is covered: left, right, top, bottom. middle: of what is covered.
+inline float4 covered_rectangle(float2 begin, float2 end, const float share, const float2 middle)
+{
+    const float2 wide = end - begin, off = middle - 0.5f * (begin + end);
+    const float missing = fmax(wide.x * wide.y - share, 0.0f);
+    const bool across = fabs(off.x) * wide.y >= fabs(off.y) * wide.x;
+    if (across && off.x >= 0.0f) begin.x += missing / wide.y;
+    if (across && off.x < 0.0f) end.x -= missing / wide.y;
+    if (!across && off.y >= 0.0f) begin.y += missing / wide.x;
+    if (!across && off.y < 0.0f) end.y -= missing / wide.x;
+    return (float4)(begin.x, end.x, begin.y, end.y);
+}
+
 // surfaces_of_texels: a larger map at a lower resolution, the nearest surface of each texel alone: what it covers of the texel, as a rectangle.
 //
 //   gap    steps of disparity up to which samples are of one surface
 //   texels [size.y][size.x]  (mean disparity, covered share)
-//   parts  [size.y][size.x]  the rectangle: left, right, top, bottom, as Patch has them
+//   parts  [size.y][size.x]  the rectangle: left, right, top, bottom, as MicroPatch has them
 //
 // It lies where the covered samples do and has their share of the texel as its area. Means of different surfaces would be none of them.
 __kernel void surfaces_of_texels(const int2 from, __global const float* restrict depth, const int2 size, const float gap, __global float2* restrict texels,
@@ -121,21 +149,10 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
             places += (int2)(2 * i + 1, 2 * j + 1);
         }
     const float2 whole = convert_float2(last - first);
-    float2 begin = convert_float2(low - first) / whole, end = convert_float2(high - first) / whole;
     const float share = count / (whole.x * whole.y);
-    const float2 wide = end - begin;
-    // The box of the samples may hold more: cut off on the side that has fewer.
-    const float2 off = (0.5f * convert_float2(places) / count - convert_float2(first)) / whole - 0.5f * (begin + end);
-    const float missing = wide.x * wide.y - share;
-    if (missing > 0.0f) {
-        const bool across = fabs(off.x) * wide.y >= fabs(off.y) * wide.x;
-        if (across && off.x >= 0.0f) begin.x += missing / wide.y;
-        if (across && off.x < 0.0f) end.x -= missing / wide.y;
-        if (!across && off.y >= 0.0f) begin.y += missing / wide.x;
-        if (!across && off.y < 0.0f) end.y -= missing / wide.x;
-    }
     texels[at] = (float2)(sum / count, share);
-    parts[at] = (float4)(begin.x, end.x, begin.y, end.y);
+    parts[at] = covered_rectangle(convert_float2(low - first) / whole, convert_float2(high - first) / whole, share,
+                                  (0.5f * convert_float2(places) / count - convert_float2(first)) / whole);
 }
 
 // micro_patches: the patches of a map.
@@ -145,24 +162,26 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
 //   parts [height][width]            of surfaces_of_texels, where has_parts; else texels are covered whole
 //   patches [height][width]
 __kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, const int has_parts, __global const float2* restrict texels,
-                            __global const float2* restrict others, __global const float4* restrict parts, __global Patch* restrict patches)
+                            __global const float2* restrict others, __global const float4* restrict parts, __global MicroPatch* restrict patches)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
     const int at = y * size.x + x;
     const float d = texels[at].x;
-    Patch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
+    MicroPatch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
     if (d > 0.0f) {
-        const float other = has_others ? others[at].x : 0.0f, middle = other > 0.0f ? 0.5f * (d + other) : d;
+        const float other = has_others ? others[at].x : 0.0f;
+        const Rim rim = {d, other > 0.0f ? other : d, precision};
         float row[5], column[5];
         for (int i = 0; i < 5; ++i) {
             row[i] = disparity_at(texels, size, x + i - 2, y);
             column[i] = disparity_at(texels, size, x, y + i - 2);
         }
-        const float left = edge_disparity(row[4], row[3], d, row[1], row[0], middle, precision, gap.x);
-        const float right = edge_disparity(row[0], row[1], d, row[3], row[4], middle, precision, gap.x);
-        const float top = edge_disparity(column[4], column[3], d, column[1], column[0], middle, precision, gap.y);
-        const float bottom = edge_disparity(column[0], column[1], d, column[3], column[4], middle, precision, gap.y);
+        const bool right_half = 2 * x + 1 > size.x, lower_half = 2 * y + 1 > size.y;
+        const float left = edge_disparity(rim, row[4], row[3], row[1], row[0], !right_half, gap.x);
+        const float right = edge_disparity(rim, row[0], row[1], row[3], row[4], right_half, gap.x);
+        const float top = edge_disparity(rim, column[4], column[3], column[1], column[0], !lower_half, gap.y);
+        const float bottom = edge_disparity(rim, column[0], column[1], column[3], column[4], lower_half, gap.y);
         patch.middle = d;
         patch.left = alone(left);
         patch.right = alone(right);
@@ -187,44 +206,77 @@ __kernel void micro_patches(const int2 size, const float precision, const float2
 
 // joined_patches: a level of patches from the one below.
 //
-//   patches  every level; [below_size.y][below_size.x] of one begin at `below_begin`, [size.y][size.x] of the next at `begin`
-__kernel void joined_patches(const int2 below_size, const int2 size, const int below_begin, const int begin, __global Patch* patches)
+//   patches  every level; [below_size.y][below_size.x] of one begin at `below_begin`, [size.y][size.x] of the next at `level_begin`
+//
+// A patch that is not FULL has its surfaces' area, where they lie.
+__kernel void joined_patches(const int2 below_size, const int2 size, const int below_begin, const int level_begin, __global MicroPatch* patches)
 {
-    __global const Patch* const below = patches + below_begin;
+    __global const MicroPatch* const below = patches + below_begin;
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-    Patch all = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
-    const int right = min(2 * x + 1, below_size.x - 1), bottom = min(2 * y + 1, below_size.y - 1);
-    const Patch a = below[2 * y * below_size.x + 2 * x], b = below[2 * y * below_size.x + right], c = below[bottom * below_size.x + 2 * x],
-                d = below[bottom * below_size.x + right];
-    all.reach = fmax(fmax(a.reach, b.reach), fmax(c.reach, d.reach));
-    const int inside = a.flags & b.flags & c.flags & d.flags & FULL;
-    if (inside && right == 2 * x + 1 && bottom == 2 * y + 1 && (a.flags & JOINED_RIGHT) && (c.flags & JOINED_RIGHT) && (a.flags & JOINED_BOTTOM) && (b.flags & JOINED_BOTTOM)) {
-        all.least = fmin(fmin(a.least, b.least), fmin(c.least, d.least));
-        all.middle = 0.25f * (a.middle + b.middle + c.middle + d.middle);
-        all.left = both(a.left, c.left);
-        all.right = both(b.right, d.right);
-        all.top = both(a.top, b.top);
-        all.bottom = both(c.bottom, d.bottom);
-        all.flags = FULL | (a.flags & c.flags & JOINED_LEFT) | (b.flags & d.flags & JOINED_RIGHT) | (a.flags & b.flags & JOINED_TOP) | (c.flags & d.flags & JOINED_BOTTOM);
+    MicroPatch all = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
+    float area = 0.0f, depths = 0.0f;
+    float2 begin = (float2)(1.0f), end = (float2)(0.0f), middle = (float2)(0.0f);
+    int flags[4];
+    all.least = MAXFLOAT;
+    all.left = all.right = all.top = all.bottom = none();
+    for (int i = 0; i < 4; ++i) {
+        const int column = 2 * x + (i & 1), row = 2 * y + (i >> 1);
+        flags[i] = 0;
+        if (column >= below_size.x || row >= below_size.y) continue;
+        const MicroPatch p = below[row * below_size.x + column];
+        if (p.reach == 0.0f) continue;
+        flags[i] = p.flags;
+        all.reach = fmax(all.reach, p.reach);
+        all.least = fmin(all.least, p.least);
+        const float2 low = 0.5f * (float2)((i & 1) + p.x0, (i >> 1) + p.y0), high = 0.5f * (float2)((i & 1) + p.x1, (i >> 1) + p.y1);
+        const float covered = (high.x - low.x) * (high.y - low.y);
+        area += covered;
+        depths = fma(covered, p.middle, depths);
+        middle += covered * 0.5f * (low + high);
+        begin = fmin(begin, low);
+        end = fmax(end, high);
+        if (i & 1)
+            all.right = both(all.right, p.right);
+        else
+            all.left = both(all.left, p.left);
+        if (i >> 1)
+            all.bottom = both(all.bottom, p.bottom);
+        else
+            all.top = both(all.top, p.top);
     }
-    patches[begin + y * size.x + x] = all;
+    if (area > 0.0f) {
+        const bool whole = (flags[0] & flags[1] & flags[2] & flags[3] & FULL) && (flags[0] & flags[2] & JOINED_RIGHT) && (flags[0] & flags[1] & JOINED_BOTTOM);
+        all.middle = depths / area;
+        // An edge of a part lies in the middle of where it is: outermost places add up.
+        all.flags = whole ? FULL | (flags[0] & flags[2] & JOINED_LEFT) | (flags[1] & flags[3] & JOINED_RIGHT) | (flags[0] & flags[1] & JOINED_TOP) | (flags[2] & flags[3] & JOINED_BOTTOM) : 0;
+        const float4 part = whole ? (float4)(0.0f, 1.0f, 0.0f, 1.0f) : covered_rectangle(begin, end, area, middle / area);
+        all.x0 = part.s0;
+        all.x1 = part.s1;
+        all.y0 = part.s2;
+        all.y1 = part.s3;
+        if (all.left.low > all.left.high) all.left = alone(all.middle);
+        if (all.right.low > all.right.high) all.right = alone(all.middle);
+        if (all.top.low > all.top.high) all.top = alone(all.middle);
+        if (all.bottom.low > all.bottom.high) all.bottom = alone(all.middle);
+    }
+    patches[level_begin + y * size.x + x] = all;
 }
 
 // solid_patches: marks what is SOLID of a level. A receiver sees the outermost places of a patch's edges; they lie beyond the true ones by no more than the
 // patch's range of disparities moves a place on the map. Where the same surface goes on for twice that, it hides what lies between.
 //
 //   moves  by how many of the level's patches one unit of disparity moves a place on the map, for light from the light's edge
-__kernel void solid_patches(const int2 size, const float2 moves, const int begin, __global Patch* all_patches)
+__kernel void solid_patches(const int2 size, const float2 moves, const int begin, __global MicroPatch* all_patches)
 {
-    __global Patch* const patches = all_patches + begin;
+    __global MicroPatch* const patches = all_patches + begin;
     const int x = get_global_id(0), y = get_global_id(1);
     if (x < 1 || y < 1 || x >= size.x - 1 || y >= size.y - 1) return;
     float reach = 0.0f, least = MAXFLOAT;
     int all = FULL;
     for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i) {
-            __global const Patch* const p = patches + (y + j) * size.x + x + i;
+            __global const MicroPatch* const p = patches + (y + j) * size.x + x + i;
             const int flags = p->flags, beside = (i < 1 ? JOINED_RIGHT : 0) | (j < 1 ? JOINED_BOTTOM : 0);
             if ((flags & beside) != beside) all = 0;
             all &= flags;
@@ -327,7 +379,7 @@ inline Along edge_of(const Along along, const int joined)
     return edge;
 }
 
-inline Rectangle rectangle_of(const Patch p, const int x, const int y, const float2 cell)
+inline Rectangle rectangle_of(const MicroPatch p, const int x, const int y, const float2 cell)
 {
     const Rectangle rectangle = {(x + p.x0) * cell.x - 1.0f,
                                  (x + p.x1) * cell.x - 1.0f,
@@ -342,7 +394,7 @@ inline Rectangle rectangle_of(const Patch p, const int x, const int y, const flo
 }
 
 // Whether all of a patch counts for each of LANES receivers, or none of it.
-inline bool on_one_side(const Patch p, const Rectangle r, const Limits limits)
+inline bool on_one_side(const MicroPatch p, const Rectangle r, const Limits limits)
 {
     const floatn middle = fma((floatn)(0.5f * (r.a0 + r.a1)), limits.slope_xi, fma((floatn)(0.5f * (r.b0 + r.b1)), limits.slope_eta, limits.level));
     const floatn half_plane = fma(fabs(limits.slope_xi), (floatn)(0.5f * (r.a1 - r.a0)), fabs(limits.slope_eta) * (0.5f * (r.b1 - r.b0)));
@@ -385,12 +437,13 @@ inline float8 box_of(__global const float* xi, __global const float* eta, __glob
 
 // soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `sides` occluder maps of one size.
 //
+//   coarse                             how much of the light's width a patch may hide that is not FULL
 //   nearest                            the greatest disparity on the maps
 //   patches_i                          every level of patches, the texels' first
 //   texels_i, steps_i [height][width]  of the maps, for receivers whose plane is not known
 //   the rest                           as in soft_shadow_map.cl
 __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int sides, const float nearest, const float bias,
-                                const float precision, const int has_planes, const int lists, __global const Patch* restrict patches_0, __global const Patch* restrict patches_1,
+                                const float precision, const int has_planes, const int lists, const float coarse, __global const MicroPatch* restrict patches_0, __global const MicroPatch* restrict patches_1,
                                 __global const float2* restrict texels_0, __global const float2* restrict steps_0, __global const float2* restrict texels_1,
                                 __global const float2* restrict steps_1, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
@@ -426,7 +479,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         const int2 last_size = sizes[PATCH_LEVELS];
         const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
         for (int side = 0; side < sides; ++side) {
-            __global const Patch* const own_patches = side ? patches_1 : patches_0;
+            __global const MicroPatch* const own_patches = side ? patches_1 : patches_0;
             Limits limits[ITEM_ROWS];
             bool has_limits = false;
             for (int root = roots.y * last_size.x; root < roots.w * last_size.x && rows_left > 0; ++root) {
@@ -439,7 +492,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                 while (left > 0 && rows_left > 0) {
                     const int3 at = cells[--left];
                     const int2 level_size = sizes[at.z];
-                    __global const Patch* const p = own_patches + begins[at.z] + at.y * level_size.x + at.x;
+                    __global const MicroPatch* const p = own_patches + begins[at.z] + at.y * level_size.x + at.x;
                     const float2 cell = search.texel * (1 << at.z);
                     if (!meets(search, p->reach, cell, at.x, at.y)) continue;
                     if (!has_limits) {
@@ -451,10 +504,13 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                         }
                         has_limits = true;
                     }
-                    bool whole = at.z == 0 || ((p->flags & FULL) && ((p->flags & SOLID) || may_be_one(search, p->reach, p->least)));
+                    // A part of a patch will do where the patch is small, as the receivers see it.
+                    const float above = p->least - search.box.s5;
+                    const bool small = cell.x * scale.x <= coarse * above && cell.y * scale.y <= coarse * above && p->reach - p->least <= coarse * above;
+                    bool whole = at.z == 0 || small || (p->flags & SOLID) || ((p->flags & FULL) && may_be_one(search, p->reach, p->least));
                     Rectangle rectangle;
                     if (whole) {
-                        const Patch patch = *p;
+                        const MicroPatch patch = *p;
                         rectangle = rectangle_of(patch, at.x, at.y, cell);
                         for (int row = 0; row < together && whole && at.z > 0; ++row) whole = over[row] || on_one_side(patch, rectangle, limits[row]);
                     }

@@ -24,6 +24,8 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 
 cl_int2 dimensions(MapSize size) { return {{size.width, size.height}}; }
 
+// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance.
+constexpr double coarse_per_tolerance = 8;
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
@@ -76,9 +78,9 @@ void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, Prep
         sizes.push_back({(sizes.back().width + 1) / 2, (sizes.back().height + 1) / 2});
         count += count_of(sizes.back());
     }
-    side.patches = work.buffer<Patch>(count, "micro-patches");
+    side.patches = work.buffer<MicroPatch>(count, "micro-patches");
     const float precision = static_cast<float>(prepared.precision);
-    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(Patch)), dimensions(size), precision,
+    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(MicroPatch)), dimensions(size), precision,
                 gap_of(prepared.view), static_cast<cl_int>(other != nullptr), static_cast<cl_int>(static_cast<bool>(side.parts)), side.map.texels,
                 other ? other->map.texels.memory() : cl::Buffer(), side.parts, side.patches);
     std::size_t below = 0;
@@ -86,9 +88,9 @@ void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, Prep
         const std::size_t begin = below + count_of(sizes[level - 1]);
         const float cells = std::ldexp(1.f, static_cast<int>(level));
         const cl_float2 moves{{0.5f / (prepared.view.light_scale_x * prepared.view.texel_x * cells), 0.5f / (prepared.view.light_scale_y * prepared.view.texel_y * cells)}};
-        work.launch(prepared.program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(Patch), dimensions(sizes[level - 1]),
+        work.launch(prepared.program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level - 1]),
                     dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), side.patches);
-        work.launch(prepared.program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(Patch), dimensions(sizes[level]), moves,
+        work.launch(prepared.program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level]), moves,
                     static_cast<cl_int>(begin), side.patches);
         below = begin;
     }
@@ -100,7 +102,7 @@ float nearest_of(opencl::Work& work, const PreparedSoftShadowMap::Side& side)
 {
     float nearest = 0;
     if (side.patches) {
-        for (const Patch& patch : work.read(side.patches, side.last_level)) nearest = std::max(nearest, patch.reach);
+        for (const MicroPatch& patch : work.read(side.patches, side.last_level)) nearest = std::max(nearest, patch.reach);
         return nearest;
     }
     for (const float d : work.read(side.superblocks)) nearest = std::max(nearest, d);
@@ -159,7 +161,8 @@ void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, cons
     const PreparedSoftShadowMap::Side &first = prepared.sides.front(), &second = prepared.sides.back();
     work.launch(prepared.program, "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + first.patches.bytes() * prepared.sides.size(),
                 receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
-                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && work.context().quirks().lanes > 1), first.patches, second.patches,
+                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && work.context().quirks().lanes > 1), static_cast<float>(coarse_per_tolerance * prepared.settings.tolerance),
+                first.patches, second.patches,
                 first.map.texels, first.map.steps, second.map.texels, second.map.steps, bounds,
                 receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }

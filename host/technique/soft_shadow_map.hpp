@@ -15,7 +15,7 @@ struct PreparedSoftShadowMap {
     struct Side {
         OccluderMap map;
         opencl::Buffer<cl_float4> parts; // of the union, of a reduced map: what the texels' surfaces cover
-        opencl::Buffer<Patch> patches; // of the union: every level, the texels' first
+        opencl::Buffer<MicroPatch> patches; // of the union: every level, the texels' first
         std::size_t last_level = 0;    // where the last begins
         opencl::Buffer<float> blocks, superblocks;
     };

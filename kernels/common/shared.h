@@ -55,7 +55,7 @@ typedef struct {
     Along left, right, bottom, top; // of the edges
     int flags;                      // JOINED_...: beyond that edge the same surface goes on; FULL, SOLID
     float x0, x1, y0, y1;           // what of the texel it covers, from its left and from its top, 0 to 1
-} Patch;
+} MicroPatch;
 
 // What casts, as soft_shadow_volume's kernels search it: sheets of light-facing triangles with the edges around them, in groups of WEDGE_GROUP.
 #define WEDGE_GROUP 16
