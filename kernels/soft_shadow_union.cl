@@ -160,16 +160,18 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
 //   gap            the step of disparity that opens half a texel, across and down
 //   texels, others [height][width]   (disparity, covered share) of the map and of the other side's; has_others: whether there is one
 //   parts [height][width]            of surfaces_of_texels, where has_parts; else texels are covered whole
-//   patches [height][width]
+//   reach, patches [height][width]   reach: the greatest disparity, 0 where nothing is; there no patch is written
 __kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, const int has_parts, __global const float2* restrict texels,
-                            __global const float2* restrict others, __global const float4* restrict parts, __global MicroPatch* restrict patches)
+                            __global const float2* restrict others, __global const float4* restrict parts, __global float* restrict reach,
+                            __global MicroPatch* restrict patches)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
     const int at = y * size.x + x;
     const float d = texels[at].x;
-    MicroPatch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
+    reach[at] = 0.0f;
     if (d > 0.0f) {
+        MicroPatch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
         const float other = has_others ? others[at].x : 0.0f;
         const Rim rim = {d, other > 0.0f ? other : d, precision};
         float row[5], column[5];
@@ -200,16 +202,18 @@ __kernel void micro_patches(const int2 size, const float precision, const float2
             patch.y1 = part.s3;
             if (part.s0 > 0.0f || part.s1 < 1.0f || part.s2 > 0.0f || part.s3 < 1.0f) patch.flags &= ~FULL;
         }
+        patches[at] = patch;
+        reach[at] = patch.reach;
     }
-    patches[at] = patch;
 }
 
 // joined_patches: a level of patches from the one below.
 //
-//   patches  every level; [below_size.y][below_size.x] of one begin at `below_begin`, [size.y][size.x] of the next at `level_begin`
+//   reach, patches  every level; [below_size.y][below_size.x] of one begin at `below_begin`, [size.y][size.x] of the next at `level_begin`
 //
 // A patch that is not FULL has its surfaces' area, where they lie.
-__kernel void joined_patches(const int2 below_size, const int2 size, const int below_begin, const int level_begin, __global MicroPatch* patches)
+__kernel void joined_patches(const int2 below_size, const int2 size, const int below_begin, const int level_begin, __global float* reach,
+                             __global MicroPatch* patches)
 {
     __global const MicroPatch* const below = patches + below_begin;
     const int x = get_global_id(0), y = get_global_id(1);
@@ -224,8 +228,8 @@ __kernel void joined_patches(const int2 below_size, const int2 size, const int b
         const int column = 2 * x + (i & 1), row = 2 * y + (i >> 1);
         flags[i] = 0;
         if (column >= below_size.x || row >= below_size.y) continue;
+        if (reach[below_begin + row * below_size.x + column] == 0.0f) continue;
         const MicroPatch p = below[row * below_size.x + column];
-        if (p.reach == 0.0f) continue;
         flags[i] = p.flags;
         all.reach = fmax(all.reach, p.reach);
         all.least = fmin(all.least, p.least);
@@ -259,23 +263,26 @@ __kernel void joined_patches(const int2 below_size, const int2 size, const int b
         if (all.right.low > all.right.high) all.right = alone(all.middle);
         if (all.top.low > all.top.high) all.top = alone(all.middle);
         if (all.bottom.low > all.bottom.high) all.bottom = alone(all.middle);
+        patches[level_begin + y * size.x + x] = all;
     }
-    patches[level_begin + y * size.x + x] = all;
+    reach[level_begin + y * size.x + x] = all.reach;
 }
 
 // solid_patches: marks what is SOLID of a level. A receiver sees the outermost places of a patch's edges; they lie beyond the true ones by no more than the
 // patch's range of disparities moves a place on the map. Where the same surface goes on for twice that, it hides what lies between.
 //
 //   moves  by how many of the level's patches one unit of disparity moves a place on the map, for light from the light's edge
-__kernel void solid_patches(const int2 size, const float2 moves, const int begin, __global MicroPatch* all_patches)
+__kernel void solid_patches(const int2 size, const float2 moves, const int begin, __global const float* restrict all_reach, __global MicroPatch* all_patches)
 {
     __global MicroPatch* const patches = all_patches + begin;
     const int x = get_global_id(0), y = get_global_id(1);
     if (x < 1 || y < 1 || x >= size.x - 1 || y >= size.y - 1) return;
+    if (all_reach[begin + y * size.x + x] == 0.0f || !(patches[y * size.x + x].flags & FULL)) return;
     float reach = 0.0f, least = MAXFLOAT;
     int all = FULL;
     for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i) {
+            if (all_reach[begin + (y + j) * size.x + x + i] == 0.0f) return;
             __global const MicroPatch* const p = patches + (y + j) * size.x + x + i;
             const int flags = p->flags, beside = (i < 1 ? JOINED_RIGHT : 0) | (j < 1 ? JOINED_BOTTOM : 0);
             if ((flags & beside) != beside) all = 0;
@@ -439,11 +446,12 @@ inline float8 box_of(__global const float* xi, __global const float* eta, __glob
 //
 //   coarse                             how much of the light's width a patch may hide that is not FULL
 //   nearest                            the greatest disparity on the maps
-//   patches_i                          every level of patches, the texels' first
+//   reach_i, patches_i                 every level of patches, the texels' first
 //   texels_i, steps_i [height][width]  of the maps, for receivers whose plane is not known
 //   the rest                           as in soft_shadow_map.cl
 __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int sides, const float nearest, const float bias,
-                                const float precision, const int has_planes, const int lists, const float coarse, __global const MicroPatch* restrict patches_0, __global const MicroPatch* restrict patches_1,
+                                const float precision, const int has_planes, const int lists, const float coarse, __global const float* restrict reach_0, __global const MicroPatch* restrict patches_0,
+                                __global const float* restrict reach_1, __global const MicroPatch* restrict patches_1,
                                 __global const float2* restrict texels_0, __global const float2* restrict steps_0, __global const float2* restrict texels_1,
                                 __global const float2* restrict steps_1, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
@@ -480,6 +488,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
         for (int side = 0; side < sides; ++side) {
             __global const MicroPatch* const own_patches = side ? patches_1 : patches_0;
+            __global const float* const own_reach = side ? reach_1 : reach_0;
             Limits limits[ITEM_ROWS];
             bool has_limits = false;
             for (int root = roots.y * last_size.x; root < roots.w * last_size.x && rows_left > 0; ++root) {
@@ -492,9 +501,10 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                 while (left > 0 && rows_left > 0) {
                     const int3 at = cells[--left];
                     const int2 level_size = sizes[at.z];
-                    __global const MicroPatch* const p = own_patches + begins[at.z] + at.y * level_size.x + at.x;
+                    const int number = begins[at.z] + at.y * level_size.x + at.x;
                     const float2 cell = search.texel * (1 << at.z);
-                    if (!meets(search, p->reach, cell, at.x, at.y)) continue;
+                    if (!meets(search, own_reach[number], cell, at.x, at.y)) continue;
+                    __global const MicroPatch* const p = own_patches + number;
                     if (!has_limits) {
                         for (int row = 0; row < together; ++row) {
                             const int place = (y + top + row) * receivers.stride + x;

@@ -25,7 +25,7 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 cl_int2 dimensions(MapSize size) { return {{size.width, size.height}}; }
 
 // How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance.
-constexpr double coarse_per_tolerance = 8;
+constexpr double coarse_per_tolerance = 6;
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
@@ -79,19 +79,20 @@ void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, Prep
         count += count_of(sizes.back());
     }
     side.patches = work.buffer<MicroPatch>(count, "micro-patches");
+    side.reach = work.buffer<float>(count, "micro-patches' reach");
     const float precision = static_cast<float>(prepared.precision);
     work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(MicroPatch)), dimensions(size), precision,
                 gap_of(prepared.view), static_cast<cl_int>(other != nullptr), static_cast<cl_int>(static_cast<bool>(side.parts)), side.map.texels,
-                other ? other->map.texels.memory() : cl::Buffer(), side.parts, side.patches);
+                other ? other->map.texels.memory() : cl::Buffer(), side.parts, side.reach, side.patches);
     std::size_t below = 0;
     for (std::size_t level = 1; level < sizes.size(); ++level) {
         const std::size_t begin = below + count_of(sizes[level - 1]);
         const float cells = std::ldexp(1.f, static_cast<int>(level));
         const cl_float2 moves{{0.5f / (prepared.view.light_scale_x * prepared.view.texel_x * cells), 0.5f / (prepared.view.light_scale_y * prepared.view.texel_y * cells)}};
         work.launch(prepared.program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level - 1]),
-                    dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), side.patches);
+                    dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), side.reach, side.patches);
         work.launch(prepared.program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level]), moves,
-                    static_cast<cl_int>(begin), side.patches);
+                    static_cast<cl_int>(begin), side.reach, side.patches);
         below = begin;
     }
     side.last_level = below;
@@ -102,7 +103,7 @@ float nearest_of(opencl::Work& work, const PreparedSoftShadowMap::Side& side)
 {
     float nearest = 0;
     if (side.patches) {
-        for (const MicroPatch& patch : work.read(side.patches, side.last_level)) nearest = std::max(nearest, patch.reach);
+        for (const float reach : work.read(side.reach, side.last_level)) nearest = std::max(nearest, reach);
         return nearest;
     }
     for (const float d : work.read(side.superblocks)) nearest = std::max(nearest, d);
@@ -162,7 +163,7 @@ void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, cons
     work.launch(prepared.program, "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + first.patches.bytes() * prepared.sides.size(),
                 receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
                 static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && work.context().quirks().lanes > 1), static_cast<float>(coarse_per_tolerance * prepared.settings.tolerance),
-                first.patches, second.patches,
+                first.reach, first.patches, second.reach, second.patches,
                 first.map.texels, first.map.steps, second.map.texels, second.map.steps, bounds,
                 receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }

@@ -16,6 +16,7 @@ struct PreparedSoftShadowMap {
         OccluderMap map;
         opencl::Buffer<cl_float4> parts; // of the union, of a reduced map: what the texels' surfaces cover
         opencl::Buffer<MicroPatch> patches; // of the union: every level, the texels' first
+        opencl::Buffer<float> reach;   // their greatest disparities
         std::size_t last_level = 0;    // where the last begins
         opencl::Buffer<float> blocks, superblocks;
     };
