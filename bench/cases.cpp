@@ -10,6 +10,12 @@ namespace {
 
 constexpr int reference_samples = 4096, sweep_samples = 1024;
 
+// As published: patches summed.
+SoftShadowMap paper(Sides sides, Accumulator accumulator = Accumulator::binary32)
+{
+    return {.preset = Preset::paper, .visibility = PatchVisibility::sum, .sides = sides, .accumulator = accumulator, .tolerance = 0};
+}
+
 void emit(Row row, const char* bench, Occluder occluder, double parameter)
 {
     row.bench = bench;
@@ -23,9 +29,9 @@ void both_versions(const Engine& engine, const char* bench, Occluder occluder, c
 {
     const Scene scene = paper_scene(occluder, options);
     const Image reference = reference_of(engine, scene, sweep_samples);
-    emit(measure(engine, scene, SoftShadowMap{.sides = Sides::front}, reference, runs), bench, occluder, parameter);
+    emit(measure(engine, scene, paper(Sides::front), reference, runs), bench, occluder, parameter);
     if (occluder != Occluder::square)
-        emit(measure(engine, scene, SoftShadowMap{.sides = Sides::both}, reference, runs), bench, occluder, parameter);
+        emit(measure(engine, scene, paper(Sides::both), reference, runs), bench, occluder, parameter);
 }
 
 } // namespace
@@ -37,7 +43,7 @@ void bunny(const Engine& engine)
     for (const int texels : {64, 128, 256, 512})
         for (const Sides sides : {Sides::front, Sides::back, Sides::both}) {
             const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = texels});
-            emit(measure(engine, at, SoftShadowMap{.sides = sides}, reference, 15), "bunny", Occluder::bunny, texels);
+            emit(measure(engine, at, paper(sides), reference, 15), "bunny", Occluder::bunny, texels);
         }
     for (const int texels : {64, 128, 256, 512}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = texels});
@@ -72,7 +78,7 @@ void light_size(const Engine& engine)
              {std::pair{64, "light_size_64"}, {128, "light_size_128"}, {256, "light_size_256"}, {512, "light_size_512"}}) {
             const Scene scene =
                 paper_scene(Occluder::bunny, {.light_side = side, .occluder_resolution = texels, .receiver_resolution = 256});
-            emit(measure(engine, scene, SoftShadowMap{}, reference, 3), bench, Occluder::bunny, side);
+            emit(measure(engine, scene, paper(Sides::both), reference, 3), bench, Occluder::bunny, side);
         }
     }
 }
@@ -99,7 +105,7 @@ void texels(const Engine& engine)
     for (const int side : {32, 64, 96, 128, 192, 256, 384, 512, 768, 1024}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = side});
         for (const Sides sides : {Sides::front, Sides::both})
-            emit(measure(engine, at, SoftShadowMap{.sides = sides}, reference, 5), "texels", Occluder::bunny,
+            emit(measure(engine, at, paper(sides), reference, 5), "texels", Occluder::bunny,
                  static_cast<double>(side) * side);
     }
 }
@@ -111,7 +117,7 @@ void accumulators(const Engine& engine)
     for (const int side : {64, 128, 256, 512, 1024}) {
         const Scene at = paper_scene(Occluder::bunny, {.occluder_resolution = side});
         for (const Accumulator accumulator : {Accumulator::binary16, Accumulator::binary32, Accumulator::compensated})
-            emit(measure(engine, at, SoftShadowMap{.sides = Sides::front, .accumulator = accumulator}, reference, 5), "accumulators",
+            emit(measure(engine, at, paper(Sides::front, accumulator), reference, 5), "accumulators",
                  Occluder::bunny, side);
     }
 }
@@ -132,7 +138,7 @@ void large(const Engine& engine)
     const SceneOptions options{.light_side = 0.2, .occluder_resolution = 2048, .receiver_resolution = 4096};
     const Scene scene = paper_scene(Occluder::bunny, options);
     const Image reference = reference_of(engine, scene, 64);
-    emit(measure(engine, scene, SoftShadowMap{.sides = Sides::front}, reference, 1), "large", Occluder::bunny, 4096);
+    emit(measure(engine, scene, paper(Sides::front), reference, 1), "large", Occluder::bunny, 4096);
 }
 
 } // namespace penumbra::bench

@@ -49,7 +49,7 @@ Report dense_pairs(const Engine& engine)
     Receivers points{.camera = view, .width = receivers, .height = receivers, .depth = {}};
     points.depth = DepthMap{.width = receivers, .height = receivers, .depth = std::vector<float>(receivers * receivers, 8.0f)};
 
-    const Prepared prepared = engine.prepare(light, occluders, SoftShadowMap{.sides = Sides::front});
+    const Prepared prepared = engine.prepare(light, occluders, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front, .tolerance = 0});
     Report best = engine.shade(prepared, points).report;
     const auto kernel_ms = [](const Report& r) {
         return std::find_if(r.stages.begin(), r.stages.end(), [](const Stage& s) { return s.name == "shade"; })->device_ms;

@@ -159,9 +159,10 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
 //
 //   gap            the step of disparity that opens half a texel, across and down
 //   texels, others [height][width]   (disparity, covered share) of the map and of the other side's; has_others: whether there is one
+//   begin          where the map's patches begin
 //   parts [height][width]            of surfaces_of_texels, where has_parts; else texels are covered whole
 //   reach, patches [height][width]   reach: the greatest disparity, 0 where nothing is; there no patch is written
-__kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, const int has_parts, __global const float2* restrict texels,
+__kernel void micro_patches(const int2 size, const float precision, const float2 gap, const int has_others, const int has_parts, const int begin, __global const float2* restrict texels,
                             __global const float2* restrict others, __global const float4* restrict parts, __global float* restrict reach,
                             __global MicroPatch* restrict patches)
 {
@@ -169,7 +170,7 @@ __kernel void micro_patches(const int2 size, const float precision, const float2
     if (x >= size.x || y >= size.y) return;
     const int at = y * size.x + x;
     const float d = texels[at].x;
-    reach[at] = 0.0f;
+    reach[begin + at] = 0.0f;
     if (d > 0.0f) {
         MicroPatch patch = {0.0f, 0.0f, 0.0f, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, {0.0f, 0.0f}, 0, 0.0f, 1.0f, 0.0f, 1.0f};
         const float other = has_others ? others[at].x : 0.0f;
@@ -202,8 +203,8 @@ __kernel void micro_patches(const int2 size, const float precision, const float2
             patch.y1 = part.s3;
             if (part.s0 > 0.0f || part.s1 < 1.0f || part.s2 > 0.0f || part.s3 < 1.0f) patch.flags &= ~FULL;
         }
-        patches[at] = patch;
-        reach[at] = patch.reach;
+        patches[begin + at] = patch;
+        reach[begin + at] = patch.reach;
     }
 }
 
@@ -442,18 +443,16 @@ inline float8 box_of(__global const float* xi, __global const float* eta, __glob
     return box;
 }
 
-// soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `sides` occluder maps of one size.
+// soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `maps` occluder maps of one size.
 //
 //   coarse                             how much of the light's width a patch may hide that is not FULL
 //   nearest                            the greatest disparity on the maps
-//   reach_i, patches_i                 every level of patches, the texels' first
-//   texels_i, steps_i [height][width]  of the maps, for receivers whose plane is not known
+//   reach, patches [maps][per_map]     every level of patches, the texels' first
+//   texels, steps [maps][height][width]  for receivers whose plane is not known
 //   the rest                           as in soft_shadow_map.cl
-__kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int sides, const float nearest, const float bias,
-                                const float precision, const int has_planes, const int lists, const float coarse, __global const float* restrict reach_0, __global const MicroPatch* restrict patches_0,
-                                __global const float* restrict reach_1, __global const MicroPatch* restrict patches_1,
-                                __global const float2* restrict texels_0, __global const float2* restrict steps_0, __global const float2* restrict texels_1,
-                                __global const float2* restrict steps_1, __global const float8* restrict bounds,
+__kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int maps, const int per_map, const float nearest, const float bias,
+                                const float precision, const int has_planes, const int lists, const float coarse, __global const float* restrict reach,
+                                __global const MicroPatch* restrict patches, __global const float2* restrict texels, __global const float2* restrict steps, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
                                 __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
                                 __global uint* restrict evaluated, __global const volatile int* stop)
@@ -486,9 +485,11 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         int rows_left = together;
         const int2 last_size = sizes[PATCH_LEVELS];
         const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
-        for (int side = 0; side < sides; ++side) {
-            __global const MicroPatch* const own_patches = side ? patches_1 : patches_0;
-            __global const float* const own_reach = side ? reach_1 : reach_0;
+        for (int map = 0; map < maps && rows_left > 0; ++map) {
+            __global const MicroPatch* const own_patches = patches + map * per_map;
+            __global const float* const own_reach = reach + map * per_map;
+            __global const float2* const own_texels = texels + map * size.x * size.y;
+            __global const float2* const own_steps_there = steps + map * size.x * size.y;
             Limits limits[ITEM_ROWS];
             bool has_limits = false;
             for (int root = roots.y * last_size.x; root < roots.w * last_size.x && rows_left > 0; ++root) {
@@ -508,7 +509,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     if (!has_limits) {
                         for (int row = 0; row < together; ++row) {
                             const int place = (y + top + row) * receivers.stride + x;
-                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, side ? texels_1 : texels_0, side ? steps_1 : steps_0,
+                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, own_texels, own_steps_there,
                                                              load_lanes((has_planes ? slope_xi : d) + place), load_lanes((has_planes ? slope_eta : d) + place), load_lanes(xi + place),
                                                              load_lanes(eta + place), load_lanes(d + place));
                         }

@@ -110,15 +110,17 @@ DepthMap empty_view(int width, int height)
 } // namespace
 
 Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::LateContext>& device, bool with_images)
+               const std::shared_ptr<const opencl::LateContext>& device, bool with_images, int layers)
 {
     const Geometry::State& state = geometry.state();
-    Views views{empty_view(width, height), empty_view(width, height), {}};
+    Views views{empty_view(width, height), empty_view(width, height), {}, {}};
     if (state.any_mesh(role)) {
         const auto tracer = role == &Object::casts ? state.casters() : state.receivers();
         const bool exact = role == &Object::receives && !(with_images && state.any_seen(role));
         if (front) views.front = tracer->front(camera, width, height, exact ? &views.normals : nullptr);
         if (back) views.back = tracer->back(camera, width, height);
+        if (layers > 0) views.layers = tracer->layers(camera, width, height, layers + 1);
+        if (!views.layers.empty()) views.layers.erase(views.layers.begin()); // the front itself
     }
     if (!with_images) return views;
     const auto images = state.images(role, device);
@@ -140,10 +142,13 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     if (render_front && !casters) missing("occluders.depth.front", "cast");
     if (render_back && !casters) missing("occluders.depth.back", "cast", "; or set \"sides\": \"front\"");
     const Camera camera = occluder_camera(light, occluders.camera, geometry.objects(), occluders.width, occluders.height, left_out);
-    if (render_front || render_back) {
-        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, device, !needs.depth_images);
+    // Depth images among what casts have a front and a back alone.
+    const bool render_layers = needs.layers > 0 && occluders.layers.empty() && casters && !geometry.state().any_seen(&Object::casts);
+    if (render_front || render_back || render_layers) {
+        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, device, !needs.depth_images, render_layers ? needs.layers : 0);
         if (render_front) occluders.front = std::move(views.front);
         if (render_back) occluders.back = std::move(views.back);
+        if (render_layers) occluders.layers = std::move(views.layers);
     }
     if (needs.front) check_size(*occluders.front, occluders.width, occluders.height, "occluders.depth.front");
     if (needs.back) check_size(*occluders.back, occluders.width, occluders.height, "occluders.depth.back");

@@ -29,10 +29,11 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
 // What a camera sees of the objects of a role: triangles by rays, depth images by walks. What is not asked for is empty.
 struct Views {
     DepthMap front, back;
+    std::vector<DepthMap> layers = {}; // of triangles, behind the front
     std::vector<DepthVector> normals; // of the front's triangles, towards the camera and in its coordinates; empty where images are among it
 };
 Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::LateContext>& device, bool with_images = true);
+               const std::shared_ptr<const opencl::LateContext>& device, bool with_images = true, int layers = 0);
 
 // What is fitted to receivers of somebody else's depth; null for depth that is exact.
 std::shared_ptr<const DepthSurface> surface_of(const Receivers& receivers, const Camera& camera,

@@ -113,6 +113,7 @@ LightDepth depth_of(const Light& light, const Occluders& occluders, const std::v
                      .device_front = {},
                      .device_back = {}};
     if (all) depth.layers = occluders.layers;
+    if (!all) depth.layers = std::span(occluders.layers).first(std::min(occluders.layers.size(), static_cast<std::size_t>(std::max(needs.layers, 0))));
     for (std::size_t i = 0; i < depth.layers.size(); ++i)
         check_size(depth.layers[i], depth.width, depth.height, "occluders.depth.layers[" + std::to_string(i) + "]");
     depth.camera = occluder_camera(light, occluders.camera, objects, occluders.width, occluders.height, left_out);

@@ -235,6 +235,14 @@ void Work::write(const cl::Buffer& memory, const void* data, std::size_t bytes)
     stages_[current_].bytes += bytes;
 }
 
+void Work::copy(const cl::Buffer& from, const cl::Buffer& to, std::size_t bytes, std::size_t offset)
+{
+    if (bytes == 0) return;
+    ensure_stage();
+    translated("copy of " + bytes_text(bytes), [&] { queue_.enqueueCopyBuffer(from, to, 0, offset, bytes, nullptr, new_event()); });
+    stages_[current_].bytes += 2 * bytes;
+}
+
 void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset)
 {
     ensure_stage();

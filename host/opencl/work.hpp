@@ -82,13 +82,16 @@ public:
         auto [memory, guard] = lent(data.data(), data.size_bytes());
         return Buffer<T>(std::move(memory), data.size(), std::move(guard));
     }
-    // All elements, or those from `first` on.
-    template <class T> std::vector<T> read(const Buffer<T>& buffer, std::size_t first = 0)
+    // All elements, or `count` of them from `first` on.
+    template <class T> std::vector<T> read(const Buffer<T>& buffer, std::size_t first = 0, std::size_t count = std::numeric_limits<std::size_t>::max())
     {
-        std::vector<T> data(buffer.count() - first);
+        std::vector<T> data(std::min(buffer.count() - first, count));
         read(buffer.memory(), data.data(), data.size() * sizeof(T), first * sizeof(T));
         return data;
     }
+
+    // All of `from` to where `to` has its element `first`.
+    template <class T> void copy(const Buffer<T>& from, const Buffer<T>& to, std::size_t first) { copy(from.memory(), to.memory(), from.bytes(), first * sizeof(T)); }
 
     // Runs a kernel over `global` items (rounded up to `local`, so kernels guard their range). Arguments: Buffers, cl::Buffers, or plain
     // values (float, int, cl_int2, structs shared with kernels); an empty Buffer is a null pointer. `bytes`: what it must move at the
@@ -137,6 +140,7 @@ private:
     bool lends(std::size_t bytes);
     std::pair<cl::Buffer, std::shared_ptr<void>> lent(const void* data, std::size_t bytes);
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
+    void copy(const cl::Buffer& from, const cl::Buffer& to, std::size_t bytes, std::size_t offset);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset);
     void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
                  std::uint64_t bytes);

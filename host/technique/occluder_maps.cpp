@@ -17,7 +17,7 @@ float light_scale(double tangent, double half_extent)
 
 opencl::Specialisation occluders_program() { return {"occluders.cl", {}}; }
 
-DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back)
+DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back, int layers)
 {
     const LightDepth& from = casting.depth;
     DeviceDepth result{.depth = {.light = light_frame(casting.light),
@@ -26,7 +26,8 @@ DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bo
                                  .height = from.height,
                                  .precision = 0,
                                  .front = from.device_front,
-                                 .back = from.device_back},
+                                 .back = from.device_back,
+                                 .layers = {}},
                        .uploaded = {}};
     OccluderDepth& depth = result.depth;
     const auto upload = [&](const DepthMap& map, const char* what) {
@@ -37,6 +38,7 @@ DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bo
     };
     if (front && from.front) depth.front = upload(*from.front, "front occluder depth");
     if (back && from.back) depth.back = upload(*from.back, "back occluder depth");
+    for (const DepthMap& layer : from.layers.first(std::min(from.layers.size(), static_cast<std::size_t>(layers)))) depth.layers.push_back(upload(layer, "occluder depth behind the front"));
     if (result.uploaded.empty()) depth.precision = 0x1p-24;
     return result;
 }

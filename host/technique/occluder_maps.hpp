@@ -18,6 +18,7 @@ struct OccluderDepth {
     int width = 0, height = 0;
     double precision = 0; // relative, of the depths
     cl::Buffer front, back;
+    std::vector<cl::Buffer> layers; // behind the front
 };
 
 // The program of occluders.cl by itself (see receivers_program).
@@ -29,7 +30,7 @@ struct DeviceDepth {
     OccluderDepth depth;
     std::vector<opencl::Buffer<float>> uploaded;
 };
-DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back);
+DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back, int layers = 0);
 
 // What a technique says when its map holds nothing.
 constexpr const char* empty_map = "the occluder map is empty: nothing casts shadows";

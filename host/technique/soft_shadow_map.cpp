@@ -6,6 +6,7 @@
 #include <penumbra/error.hpp>
 
 #include "technique/keys.hpp"
+#include "technique/tiling.hpp"
 #include "technique/work_estimate.hpp"
 
 namespace penumbra {
@@ -24,10 +25,6 @@ std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width)
 
 cl_int2 dimensions(MapSize size) { return {{size.width, size.height}}; }
 
-// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance.
-constexpr double coarse_per_tolerance = 6;
-constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
-
 std::array<std::size_t, 2> grid_of(MapSize size) { return {static_cast<std::size_t>(size.width), static_cast<std::size_t>(size.height)}; }
 
 // The levels above a side's texels.
@@ -41,84 +38,49 @@ void build_pyramid(opencl::Work& work, const PreparedSoftShadowMap& prepared, Ma
                 side.superblocks);
 }
 
-// The step of disparity between two texels that lets half a texel of light through at the most, across and down.
-cl_float2 gap_of(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
-
-// For the union a larger map becomes surfaces with what they cover of each texel: the mean of two surfaces is none of them.
-void reduce_to_surfaces(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from, MapSize size, PreparedSoftShadowMap::Side& side)
+PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from, MapSize size)
 {
-    side.map = {.texels = work.buffer<cl_float2>(count_of(size), "occluder texels"), .steps = work.buffer<cl_float2>(count_of(size), "occluder slopes")};
-    side.parts = work.buffer<cl_float4>(count_of(size), "covered parts of texels");
-    const cl_float2 gap = gap_of(prepared.view);
-    work.launch(prepared.program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count_of(size) * 24, dimensions(from), depth, dimensions(size),
-                std::min(gap.s[0], gap.s[1]), side.map.texels, side.parts);
-    work.launch(prepared.program, "slope_steps", grid_of(size), {16, 8}, count_of(size) * 16, dimensions(size), static_cast<float>(prepared.precision), side.map.texels,
-                side.map.steps);
-}
-
-PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const cl::Buffer& depth, MapSize from,
-                                         MapSize size)
-{
-    const bool united = prepared.settings.visibility == PatchVisibility::united;
-    PreparedSoftShadowMap::Side side;
-    if (united && count_of(from) > count_of(size))
-        reduce_to_surfaces(work, prepared, depth, from, size, side);
-    else
-        side.map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program);
-    if (!united) build_pyramid(work, prepared, size, side);
+    PreparedSoftShadowMap::Side side{.map = occluder_map(work, depth, from, size, prepared.settings.reduction, prepared.precision, prepared.program), .blocks = {}, .superblocks = {}};
+    build_pyramid(work, prepared, size, side);
     return side;
 }
 
-// The patches of a side, which know the other's, and the levels above them.
-void add_patches(opencl::Work& work, const PreparedSoftShadowMap& prepared, PreparedSoftShadowMap::Side& side, const PreparedSoftShadowMap::Side* other, MapSize size)
+// Texels of all maps of a union together, as long as nobody asks for a resolution: larger maps become surfaces with what they cover of larger texels, which
+// loses little, and patches take 85 bytes a texel.
+constexpr double most_union_texels = 1 << 21;
+
+// The size that a map is shaded with.
+MapSize size_of(const OccluderDepth& depth, const SoftShadowMap& settings)
 {
-    std::vector<MapSize> sizes{size};
-    std::size_t count = count_of(size);
-    for (int level = 1; level <= patch_levels; ++level) {
-        sizes.push_back({(sizes.back().width + 1) / 2, (sizes.back().height + 1) / 2});
-        count += count_of(sizes.back());
-    }
-    side.patches = work.buffer<MicroPatch>(count, "micro-patches");
-    side.reach = work.buffer<float>(count, "micro-patches' reach");
-    const float precision = static_cast<float>(prepared.precision);
-    work.launch(prepared.program, "micro_patches", grid_of(size), {16, 4}, count_of(size) * (16 + sizeof(MicroPatch)), dimensions(size), precision,
-                gap_of(prepared.view), static_cast<cl_int>(other != nullptr), static_cast<cl_int>(static_cast<bool>(side.parts)), side.map.texels,
-                other ? other->map.texels.memory() : cl::Buffer(), side.parts, side.reach, side.patches);
-    std::size_t below = 0;
-    for (std::size_t level = 1; level < sizes.size(); ++level) {
-        const std::size_t begin = below + count_of(sizes[level - 1]);
-        const float cells = std::ldexp(1.f, static_cast<int>(level));
-        const cl_float2 moves{{0.5f / (prepared.view.light_scale_x * prepared.view.texel_x * cells), 0.5f / (prepared.view.light_scale_y * prepared.view.texel_y * cells)}};
-        work.launch(prepared.program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level - 1]),
-                    dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), side.reach, side.patches);
-        work.launch(prepared.program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level]), moves,
-                    static_cast<cl_int>(begin), side.reach, side.patches);
-        below = begin;
-    }
-    side.last_level = below;
+    if (settings.visibility == PatchVisibility::sum || settings.resolution > 0) return reduced_size(depth.width, depth.height, settings.resolution);
+    const double maps = (settings.sides == Sides::both ? 2 : 1) + static_cast<double>(depth.layers.size());
+    const double texels = static_cast<double>(depth.width) * depth.height * maps;
+    if (texels <= most_union_texels) return {depth.width, depth.height};
+    return reduced_size(depth.width, depth.height, std::max(1, static_cast<int>(std::max(depth.width, depth.height) * std::sqrt(most_union_texels / texels))));
 }
 
-// The greatest disparity of a side.
-float nearest_of(opencl::Work& work, const PreparedSoftShadowMap::Side& side)
+// The maps of a union: front and back, or entries and exits in turn, and the back for what lies behind them.
+PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepared, const OccluderDepth& depth, MapSize from, MapSize size)
 {
-    float nearest = 0;
-    if (side.patches) {
-        for (const float reach : work.read(side.reach, side.last_level)) nearest = std::max(nearest, reach);
-        return nearest;
+    const Sides sides = prepared.settings.sides;
+    std::vector<cl::Buffer> maps;
+    std::vector<int> other;
+    if (sides != Sides::back) {
+        maps.push_back(depth.front);
+        maps.insert(maps.end(), depth.layers.begin(), depth.layers.end());
     }
-    for (const float d : work.read(side.superblocks)) nearest = std::max(nearest, d);
-    return nearest;
+    const int entries = static_cast<int>(maps.size());
+    if (sides != Sides::front) maps.push_back(depth.back);
+    for (int i = 0; i < entries; ++i) other.push_back(entries > 1 ? ((i ^ 1) < entries ? i ^ 1 : -1) : sides == Sides::both ? 1 : -1);
+    if (sides != Sides::front) other.push_back(entries == 1 ? 0 : -1);
+    return prepare_union(work, {.depth = maps, .other = other, .from = from, .size = size, .precision = prepared.precision}, prepared.view);
 }
-
-// Rows of a tile that one work-item owns: all of them, or on devices that vectorise by themselves one.
-int item_rows(int lanes) { return lanes == 1 ? 1 : tile_rows; }
 
 // The program with every kernel that the technique launches.
 opencl::Specialisation program(const SoftShadowMap& settings, int lanes)
 {
     if (settings.visibility == PatchVisibility::united)
-        return {"soft_shadow_union.cl",
-                {{"LANES", std::to_string(lanes)}, {"ITEM_ROWS", std::to_string(item_rows(lanes))}, {"TILE_ROWS", std::to_string(tile_rows)}}};
+        return union_program(lanes);
     return {"soft_shadow_map.cl",
             {{"LANES", std::to_string(lanes)},
              {"ITEM_ROWS", std::to_string(item_rows(lanes))},
@@ -126,46 +88,17 @@ opencl::Specialisation program(const SoftShadowMap& settings, int lanes)
              choice_constant("ACCUMULATOR", accumulator_names, settings.accumulator)}};
 }
 
-// How a kernel's work-items share the receivers. On a GPU a tile is a work-group; on a CPU device a work-item, and groups of one keep the share of each
-// thread fine.
-struct Tiling {
-    std::array<std::size_t, 2> items, group;
-    std::uint64_t bytes; // of the receivers and their mask
-};
-Tiling tiling_of(opencl::Work& work, const ReceiverView& view)
-{
-    const int lanes = work.context().quirks().lanes;
-    const auto width = static_cast<std::size_t>(view.stride), height = static_cast<std::size_t>(view.rows);
-    return {.items = {width / static_cast<std::size_t>(lanes), height / static_cast<std::size_t>(item_rows(lanes))},
-            .group = lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1},
-            .bytes = width * height * 16};
-}
-
 // One pass over the receivers for one occluder map.
 void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const PreparedSoftShadowMap::Side& side, bool merge,
                 const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility,
                 const opencl::Buffer<cl_uint>& evaluated)
 {
-    const Tiling tiling = tiling_of(work, receivers.view);
+    const Tiling tiling = tiling_of(receivers.view, work.context().quirks().lanes);
     const float bias = static_cast<float>(prepared.settings.bias);
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
     work.launch(prepared.program, "soft_shadow_map", tiling.items, tiling.group, tiling.bytes + side.map.texels.bytes(), receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
                 side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
-}
-
-// All maps at once.
-void shade_union(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& receivers, const opencl::Buffer<cl_float8>& bounds,
-                 const cl::Buffer& visibility, const opencl::Buffer<cl_uint>& evaluated)
-{
-    const Tiling tiling = tiling_of(work, receivers.view);
-    const PreparedSoftShadowMap::Side &first = prepared.sides.front(), &second = prepared.sides.back();
-    work.launch(prepared.program, "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + first.patches.bytes() * prepared.sides.size(),
-                receivers.view, prepared.view, static_cast<cl_int>(prepared.sides.size()), prepared.nearest, static_cast<float>(prepared.settings.bias),
-                static_cast<float>(std::max(prepared.precision, receivers.precision)), static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && work.context().quirks().lanes > 1), static_cast<float>(coarse_per_tolerance * prepared.settings.tolerance),
-                first.reach, first.patches, second.reach, second.patches,
-                first.map.texels, first.map.steps, second.map.texels, second.map.steps, bounds,
-                receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
 }
 
 // Says what shading will take before it begins.
@@ -198,6 +131,7 @@ SoftShadowMap paper_settings()
     SoftShadowMap settings;
     settings.preset = Preset::paper;
     settings.visibility = PatchVisibility::sum;
+    settings.layers = 0;
     settings.tolerance = 0;
     return settings;
 }
@@ -214,9 +148,11 @@ TechniqueRow row(const SoftShadowMap&)
         .keys = {preset_key<S>(paper_settings()),
                  choice_key<S>("visibility", &S::visibility, visibility_names,
                                "how patches are joined: union hides each of 32 x 32 samples of the light once; sum adds shares up (3.4, 3.5)"),
+                 integer_key<S>("layers", &S::layers, {0, 16}, "maps",
+                                "of the union: surfaces behind the front that are used, peeled from the objects or given in occluders.depth.layers"),
                  choice_key<S>("sides", &S::sides, sides_names, "which occluder maps are used; both merges them by the larger occlusion"),
                  integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
-                                "longer side of the occluder map that is shaded with, made from the one given; 0: as it is"),
+                                "longer side of the occluder map that is shaded with, made from the one given; 0: as it is, of the union up to 2^21 texels of all maps together"),
                  choice_key<S>("reduction", &S::reduction, reduction_names,
                                "how a larger map becomes `resolution`, for sum: by covered area, or by the texel at the centre; union takes the texel at the centre"),
                  choice_key<S>("accumulator", &S::accumulator, accumulator_names,
@@ -245,20 +181,23 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
 {
     check_together(settings);
     const MapSize from{depth.width, depth.height};
-    const MapSize size = reduced_size(depth.width, depth.height, settings.resolution);
+    const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,
                                    .program = program(settings, work.context().quirks().lanes),
                                    .view = occluder_view(depth, size),
                                    .precision = depth.precision,
                                    .nearest = 0,
-                                   .sides = {}};
+                                   .sides = {},
+                                   .united = {}};
+    if (settings.visibility == PatchVisibility::united) {
+        prepared.united = united_maps(work, prepared, depth, from, size);
+        prepared.nearest = prepared.united.nearest;
+        return prepared;
+    }
     if (settings.sides != Sides::back) prepared.sides.push_back(prepare_side(work, prepared, depth.front, from, size));
     if (settings.sides != Sides::front) prepared.sides.push_back(prepare_side(work, prepared, depth.back, from, size));
-
-    if (settings.visibility == PatchVisibility::united)
-        for (std::size_t i = 0; i < prepared.sides.size(); ++i)
-            add_patches(work, prepared, prepared.sides[i], prepared.sides.size() == 2 ? &prepared.sides[1 - i] : nullptr, size);
-    for (const auto& side : prepared.sides) prepared.nearest = std::max(prepared.nearest, nearest_of(work, side));
+    for (const auto& side : prepared.sides)
+        for (const float d : work.read(side.superblocks)) prepared.nearest = std::max(prepared.nearest, d);
     return prepared;
 }
 
@@ -274,8 +213,10 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
     work.launch(prepared.program, "tile_bounds", {tiles_x, tiles_y}, {16, 1}, receivers.d.bytes() * 3, receivers.view, prepared.nearest,
                 half_inverse_scale, receivers.xi, receivers.eta, receivers.d, bounds);
     const bool united = prepared.settings.visibility == PatchVisibility::united; // counts by rows of a tile, sum by tiles
-    if (united) shade_union(work, prepared, receivers, bounds, visibility, evaluated);
-    for (std::size_t i = 0; i < prepared.sides.size() && !united; ++i)
+    if (united)
+        shade_union(work, prepared.united, prepared.view, {.bias = prepared.settings.bias, .tolerance = prepared.settings.tolerance, .precision = prepared.precision}, receivers, bounds,
+                    visibility, evaluated);
+    for (std::size_t i = 0; i < prepared.sides.size(); ++i)
         shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
     if (!counts) return;
@@ -297,14 +238,17 @@ void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::
 
 Needs needs(const SoftShadowMap& settings)
 {
-    return {.front = settings.sides != Sides::back, .back = settings.sides != Sides::front, .receivers_from_light = settings.project};
+    return {.front = settings.sides != Sides::back,
+            .back = settings.sides != Sides::front,
+            .layers = settings.visibility == PatchVisibility::united && settings.sides != Sides::back ? settings.layers : 0,
+            .receivers_from_light = settings.project};
 }
 
 PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings)
 {
     const Needs wanted = needs(settings);
     findings.view = casting.depth.camera;
-    const DeviceDepth maps = on_device(work, casting, wanted.front, wanted.back);
+    const DeviceDepth maps = on_device(work, casting, wanted.front, wanted.back, wanted.layers);
     work.stage("prepare");
     PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, maps.depth, settings);
     if (prepared.nearest == 0) findings.warnings.emplace_back(empty_map);
@@ -327,7 +271,7 @@ std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& sha
     double texels = 0;
     for (const MaskShape::Map& given : shape.occluders) {
         const MapSize map = reduced_size(given.width, given.height, settings.resolution);
-        texels += static_cast<double>(map.width) * map.height * (settings.sides == Sides::both ? 2 : 1);
+        texels += static_cast<double>(map.width) * map.height * ((settings.sides == Sides::both ? 2 : 1) + settings.layers);
     }
     std::vector<WorkAmount> amounts;
     double points = shape.pixels();

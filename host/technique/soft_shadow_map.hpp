@@ -5,6 +5,7 @@
 
 #include "technique/occluder_maps.hpp"
 #include "technique/receiver_points.hpp"
+#include "technique/soft_shadow_union.hpp"
 #include "technique/table.hpp"
 #include "technique/verbs.hpp"
 
@@ -14,10 +15,6 @@ struct PreparedSoftShadowMap {
     // One occluder map and its pyramid: the nearest disparity in each block of texels, and in each block of blocks.
     struct Side {
         OccluderMap map;
-        opencl::Buffer<cl_float4> parts; // of the union, of a reduced map: what the texels' surfaces cover
-        opencl::Buffer<MicroPatch> patches; // of the union: every level, the texels' first
-        opencl::Buffer<float> reach;   // their greatest disparities
-        std::size_t last_level = 0;    // where the last begins
         opencl::Buffer<float> blocks, superblocks;
     };
     SoftShadowMap settings;
@@ -25,7 +22,8 @@ struct PreparedSoftShadowMap {
     OccluderView view{};
     double precision = 0;
     float nearest = 0; // greatest disparity of any side; 0: nothing casts
-    std::vector<Side> sides;
+    std::vector<Side> sides; // of the sum
+    PreparedUnion united;    // of the union
 };
 
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings);

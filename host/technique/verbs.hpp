@@ -48,6 +48,7 @@ namespace penumbra {
 struct Needs {
     // The light's own view of what casts: rendered from the objects that cast where the scene has no map.
     bool front = false, back = false;
+    int layers = 0; // surfaces behind the front, at the most
     // Objects that cast. or_front: without any, the maps that the scene has do, of which front must be one.
     enum class Casters { unused, or_front, required };
     Casters casters = Casters::unused;

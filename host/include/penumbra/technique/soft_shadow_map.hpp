@@ -16,15 +16,17 @@ struct SoftShadowMap {
     Preset preset = Preset::best; // what the other settings started from
     // united (`union` in scene files): which of 32 x 32 samples of the light the patches of all maps hide, each once. sum: the paper's, the shares
     // added up, and of two maps the larger.
-    PatchVisibility visibility = PatchVisibility::sum;
+    PatchVisibility visibility = PatchVisibility::united;
     Sides sides = Sides::both;                       // 3.5: one map each, merged by the larger occlusion
-    int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is
+    int layers = 3;                                  // of the union: surfaces behind the front that are used as well, peeled or given
+    int resolution = 0;                              // texels along the occluder map's longer side; 0: the map as it is, of the union up to 2^21 texels of all maps
     Reduction reduction = Reduction::area;           // how a larger map becomes `resolution`, of sum; united takes the nearest texel
     Accumulator accumulator = Accumulator::binary32; // of sum; binary16: the blending of Appendix A, for study
     double bias = 1.0;                               // in units of the bound derived from each texel's slope and the depth's precision
     bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
     int project_resolution = 512;                    // of that mask
-    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
+    // What computing less may add to a pixel's error: fewer receivers (docs/tolerance.md), and of the union coarser patches. 0: everything is computed.
+    double tolerance = 0.005;
 };
 
 } // namespace penumbra

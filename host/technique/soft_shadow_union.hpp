@@ -1,0 +1,42 @@
+// The union of soft_shadow_map on the device: the patches of any number of occluder maps (kernels/soft_shadow_union.cl).
+#pragma once
+
+#include <span>
+
+#include "technique/occluder_maps.hpp"
+#include "technique/receiver_points.hpp"
+
+namespace penumbra {
+
+// All maps behind each other: texels and steps [maps][height][width]; reach and patches [maps][every level, the texels' first].
+struct PreparedUnion {
+    opencl::Buffer<cl_float2> texels, steps;
+    opencl::Buffer<float> reach; // the patches' greatest disparities
+    opencl::Buffer<MicroPatch> patches;
+    int maps = 0;
+    std::size_t per_map = 0; // patches
+    float nearest = 0;       // greatest disparity of all; 0: nothing casts
+};
+
+// What the union is made from: planar depth maps, `from` texels each, used at `size`. `other`: of each map the number of the one that shows the other side of
+// its bodies, the next entry's exit or the last exit's entry; -1: none.
+struct UnionMaps {
+    std::span<const cl::Buffer> depth;
+    std::span<const int> other;
+    MapSize from, size;
+    double precision; // relative, of the depths
+};
+
+opencl::Specialisation union_program(int lanes);
+
+PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view);
+
+struct UnionShading {
+    double bias, tolerance;
+    double precision; // relative, of all depths
+};
+// Writes visibility and, a tile, how many patches its rows of receivers looked at.
+void shade_union(opencl::Work& work, const PreparedUnion& prepared, const OccluderView& view, const UnionShading& shading, const ReceiverPoints& receivers,
+                 const opencl::Buffer<cl_float8>& bounds, const cl::Buffer& visibility, const opencl::Buffer<cl_uint>& evaluated);
+
+} // namespace penumbra

@@ -1,0 +1,142 @@
+// Which receivers are shaded, and what lies between them.
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "refine/coarse_to_fine.hpp"
+#include "scene/camera.hpp"
+#include "support/maps.hpp"
+
+namespace penumbra::test {
+namespace {
+
+// Receivers seen from above, under a light of 1 x 1 at a height of 8 that nothing or one plate stands before.
+struct World {
+    int width, height;
+    DepthMap receivers;
+    Camera camera = light_camera(LightFrame{}, {0.5, 0.5}, {0, 0, 0});
+    LightFrame light{.half_u = 0.5, .half_v = 0.5};
+    DepthMap map{.width = 32, .height = 32, .depth = std::vector<float>(32 * 32, INFINITY)};
+
+    World(int w, int h, float depth = 8) : width(w), height(h), receivers{.width = w, .height = h, .depth = std::vector<float>(static_cast<std::size_t>(w * h), depth)} {}
+
+    OccluderField field() const
+    {
+        const DepthMap* maps[] = {&map};
+        return {light, camera, maps};
+    }
+    ReceiverImage image() const { return {.camera = camera, .width = width, .height = height, .depth = receivers.depth, .points = {}, .normals = {}}; }
+    template <class Value> CoarseToFine shade(double tolerance, const Value& value) const
+    {
+        std::set<std::uint32_t> asked;
+        return shade_coarse_to_fine(image(), 1, tolerance, field(), [&](std::span<const std::uint32_t> pixels) {
+            std::vector<float> values;
+            for (const std::uint32_t pixel : pixels) {
+                EXPECT_TRUE(asked.insert(pixel).second) << pixel << " twice";
+                values.push_back(value(static_cast<int>(pixel) % width, static_cast<int>(pixel) / width));
+            }
+            return values;
+        });
+    }
+};
+
+TEST(CoarseToFine, ShadesFewOfAPlaneThatNothingCastsOn)
+{
+    const World world(257, 129);
+    const CoarseToFine result = world.shade(0.01, [](int, int) { return 1.f; });
+    EXPECT_EQ(result.receivers, 257u * 129);
+    EXPECT_EQ(result.shaded, 33u * 17); // every eighth, each way
+    for (const float v : result.visibility) ASSERT_EQ(v, 1);
+}
+
+TEST(CoarseToFine, KeepsToTheToleranceOnSmoothMasks)
+{
+    const World world(301, 211);
+    for (const double tolerance : {0.02, 0.005, 0.001}) {
+        const auto value = [](int x, int y) { return static_cast<float>(0.5 + 0.3 * std::sin(x / 29.0) * std::cos(y / 37.0 + x / 91.0)); };
+        const CoarseToFine result = world.shade(tolerance, value);
+        EXPECT_LT(result.shaded, result.receivers / 2) << tolerance;
+        for (int y = 0; y < world.height; ++y)
+            for (int x = 0; x < world.width; ++x) ASSERT_NEAR(result.visibility[static_cast<std::size_t>(y * world.width + x)], value(x, y), tolerance) << x << ' ' << y;
+    }
+}
+
+TEST(CoarseToFine, WhatWasShadedStaysAsItWas)
+{
+    const World world(90, 61);
+    std::vector<float> values(90 * 61);
+    std::mt19937 random(5);
+    for (float& v : values) v = std::uniform_real_distribution<float>(0, 1)(random);
+    const CoarseToFine result = world.shade(0.01, [&](int x, int y) { return values[static_cast<std::size_t>(y * 90 + x)]; });
+    EXPECT_EQ(result.shaded, result.receivers); // noise tells nothing about its neighbours
+    EXPECT_EQ(result.visibility, values);
+}
+
+TEST(CoarseToFine, EverySizeAndNoReceivers)
+{
+    for (const auto& [width, height] : {std::pair{1, 1}, {1, 40}, {40, 1}, {2, 2}, {7, 61}, {17, 16}, {93, 3}}) {
+        World world(width, height);
+        const auto value = [](int x, int y) { return x > y ? 0.25f : 0.75f; };
+        const CoarseToFine result = world.shade(0.001, value);
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) ASSERT_NEAR(result.visibility[static_cast<std::size_t>(y * width + x)], value(x, y), 0.001) << width << ' ' << height << ' ' << x << ' ' << y;
+        world.receivers.depth.assign(world.receivers.depth.size(), INFINITY);
+        const CoarseToFine none = world.shade(0.001, [](int, int) { return 0.f; });
+        EXPECT_EQ(none.shaded, 0u);
+        EXPECT_EQ(none.receivers, 0u);
+        for (const float v : none.visibility) ASSERT_EQ(v, 1);
+    }
+}
+
+// A step in depth: on either side its own visibility, smooth enough to be told from few.
+TEST(CoarseToFine, NothingIsTakenAcrossAStepInDepth)
+{
+    World world(128, 128);
+    for (int y = 0; y < 128; ++y)
+        for (int x = 61; x < 128; ++x) world.receivers.at(x, y) = 6;
+    const auto value = [](int x, int) { return x < 61 ? 0.2f : 0.8f; };
+    const CoarseToFine result = world.shade(0.01, value);
+    for (int y = 0; y < 128; ++y)
+        for (int x = 0; x < 128; ++x) ASSERT_EQ(result.visibility[static_cast<std::size_t>(y * 128 + x)], value(x, y)) << x << ' ' << y;
+    EXPECT_LT(result.shaded, 128u * 128 / 4);
+}
+
+// A crease and a turned normal alike.
+TEST(CoarseToFine, NothingIsTakenAcrossATurnedNormal)
+{
+    World world(64, 64);
+    std::vector<DepthVector> normals(64 * 64, DepthVector{0, 0, -1});
+    for (int y = 0; y < 64; ++y)
+        for (int x = 37; x < 64; ++x) normals[static_cast<std::size_t>(y * 64 + x)] = {0.6f, 0, -0.8f};
+    ReceiverImage image = world.image();
+    image.normals = normals;
+    const OccluderField field = world.field();
+    const CoarseToFine result = shade_coarse_to_fine(image, 1, 0.01, field, [](std::span<const std::uint32_t> pixels) {
+        std::vector<float> values;
+        for (const std::uint32_t pixel : pixels) values.push_back(pixel % 64 < 37 ? 0.f : 1.f);
+        return values;
+    });
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) ASSERT_EQ(result.visibility[static_cast<std::size_t>(y * 64 + x)], x < 37 ? 0.f : 1.f);
+}
+
+// A bar close above the receivers, thinner than the steps between those that are shaded first: nobody who looks at every eighth sees it.
+TEST(CoarseToFine, ABarBetweenTheShadedReceiversIsSeen)
+{
+    World world(512, 512);
+    for (int y = 0; y < 32; ++y) world.map.at(13, y) = 7.98f; // hard shadows: 2 cm above, 8 m from a light of 1 m
+    const double left = 2.0 * 13 / 32 - 1, right = 2.0 * 14 / 32 - 1;
+    const auto value = [&](int x, int) {
+        const double xi = (2 * x + 1) / 512.0 - 1;
+        return xi > left && xi < right ? 0.f : 1.f;
+    };
+    const CoarseToFine result = world.shade(0.01, value);
+    for (int y = 0; y < 512; ++y)
+        for (int x = 0; x < 512; ++x) ASSERT_EQ(result.visibility[static_cast<std::size_t>(y * 512 + x)], value(x, y)) << x;
+}
+
+} // namespace
+} // namespace penumbra::test
