@@ -14,8 +14,9 @@ import sys
 from collections import defaultdict
 
 TARGETS = (0.02, 0.01, 0.005, 0.003)
-LEFT_OUT = {"preset", "sides", "reduction", "accumulator", "bias", "project", "project_resolution", "seed", "first_samples", "resolution", "adaptive", "placement",
-            "projection_centre", "prefilter", "storage", "combine", "layers", "leak_fix", "self_shadow", "coverage", "smooth", "corner_wedges", "overlap", "table", "lookup",
+SILENT = {("visibility", "union"), ("resolution", "0"), ("adaptive", "false")}
+LEFT_OUT = {"preset", "sides", "reduction", "accumulator", "bias", "project", "project_resolution", "seed", "first_samples", "adaptive", "placement",
+            "projection_centre", "prefilter", "storage", "combine", "leak_fix", "self_shadow", "coverage", "smooth", "corner_wedges", "overlap", "table", "lookup",
             "buffer", "culling", "t_from", "t", "falloff", "slices"}
 
 
@@ -26,8 +27,9 @@ def rows_of(path):
     rows = []
     for row in csv.DictReader(lines):
         keys = dict(pair.split("=", 1) for pair in row["settings"].split())
+        keys = {key: value for key, value in keys.items() if (key, value) not in SILENT}
         shown = " ".join(f"{key}={value}" for key, value in keys.items() if key not in LEFT_OUT or (key == "adaptive" and value == "true"))
-        rows.append({"scene": row["scene"], "technique": row["technique"], "setting": shown, "rival": row["technique"] == "ray_traced" and float(keys["tolerance"]) == 0,
+        rows.append({"scene": row["scene"], "technique": row["technique"], "setting": shown, "rival": row["technique"] == "ray_traced" and float(keys.get("tolerance", 0)) == 0,
                      "error": float(row["mae_shadow"]), "time": float(row["prepare_ms"]) + float(row["shade_ms_median"]), "share": float(row["parameter"])})
     return rows
 

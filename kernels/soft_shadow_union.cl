@@ -449,13 +449,14 @@ inline float8 box_of(__global const float* xi, __global const float* eta, __glob
 //   nearest                            the greatest disparity on the maps
 //   reach, patches [maps][per_map]     every level of patches, the texels' first
 //   texels, steps [maps][height][width]  for receivers whose plane is not known
+//   light_rows [SIDE], light_samples   which samples shine, and how many: all, of a disc those inside
 //   the rest                           as in soft_shadow_map.cl
 __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int maps, const int per_map, const float nearest, const float bias,
                                 const float precision, const int has_planes, const int lists, const float coarse, __global const float* restrict reach,
                                 __global const MicroPatch* restrict patches, __global const float2* restrict texels, __global const float2* restrict steps, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                                __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
-                                __global uint* restrict evaluated, __global const volatile int* stop)
+                                __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global const uint* restrict light_rows, const int light_samples,
+                                __global float* restrict visibility, __global uint* restrict evaluated, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= receivers.stride || y >= receivers.rows) return;
@@ -479,7 +480,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         uintn bits[ITEM_ROWS][SIDE];
         bool over[ITEM_ROWS]; // nothing is left to hide
         for (int row = 0; row < together; ++row) {
-            for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(0u);
+            for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(~light_rows[k]);
             over[row] = false;
         }
         int rows_left = together;
@@ -554,7 +555,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         for (int row = top; row < top + together && y + row < receivers.height; ++row) {
             uintn hidden = (uintn)(0u);
             for (int k = 0; k < SIDE; ++k) hidden += popcount(bits[row - top][k]);
-            write_visibility(visibility + (y + row) * receivers.width + x, 1.0f - convert_floatn(hidden) * (1.0f / (SIDE * SIDE)), receivers.width - x, 0);
+            write_visibility(visibility + (y + row) * receivers.width + x, convert_floatn((uintn)(SIDE * SIDE) - hidden) * (1.0f / light_samples), receivers.width - x, 0);
         }
     }
     if (x % TILE_WIDTH == 0 && y % TILE_ROWS == 0) evaluated[tile] = count;

@@ -73,7 +73,7 @@ PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepa
     if (sides != Sides::front) maps.push_back(depth.back);
     for (int i = 0; i < entries; ++i) other.push_back(entries > 1 ? ((i ^ 1) < entries ? i ^ 1 : -1) : sides == Sides::both ? 1 : -1);
     if (sides != Sides::front) other.push_back(entries == 1 ? 0 : -1);
-    return prepare_union(work, {.depth = maps, .other = other, .from = from, .size = size, .precision = prepared.precision}, prepared.view);
+    return prepare_union(work, {.depth = maps, .other = other, .from = from, .size = size, .precision = prepared.precision, .shape = depth.light.shape}, prepared.view);
 }
 
 // The program with every kernel that the technique launches.
@@ -163,7 +163,7 @@ TechniqueRow row(const SoftShadowMap&)
                  integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
                                 "side of the light's-view mask with project"),
                  tolerance_key<S>()},
-        .lights = {"rectangle", "point"},
+        .lights = {"rectangle", "sphere", "point"},
         .textured_lights = false,
         .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
                   "(or objects)",
@@ -180,6 +180,9 @@ void check_together(const SoftShadowMap& settings)
 PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
 {
     check_together(settings);
+    if (settings.visibility == PatchVisibility::sum && depth.light.shape == LightShape::disc)
+        throw Error::at(ErrorCode::unsupported, "light.kind", "is sphere, and soft_shadow_map with visibility sum cannot take one",
+                        "use visibility union, or a rectangle of the same area: half-edges of 0.886 times the radius");
     const MapSize from{depth.width, depth.height};
     const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,

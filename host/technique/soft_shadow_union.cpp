@@ -1,6 +1,7 @@
 #include "technique/soft_shadow_union.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "technique/tiling.hpp"
@@ -25,6 +26,30 @@ std::vector<MapSize> level_sizes(MapSize size)
 
 // The step of disparity between two texels that lets half a texel of light through at the most, across and down.
 cl_float2 gap_of(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
+
+// Where sample (i, k) of the light lies, 0 to 1 (kernels/common/light_pattern.clh).
+std::pair<double, double> sample_place(unsigned i, unsigned k)
+{
+    constexpr std::array<std::uint32_t, 5> bits{LIGHT_COLUMN_BITS};
+    unsigned reversed = 0, mapped = 0;
+    for (unsigned b = 0; b < bits.size(); ++b) {
+        reversed |= (k >> b & 1) << (4 - b);
+        mapped |= (bits[b] >> i & 1) << b;
+    }
+    return {(i + (reversed + 0.5) / LIGHT_SIDE) / LIGHT_SIDE, (k + (mapped + 0.5) / LIGHT_SIDE) / LIGHT_SIDE};
+}
+
+// The samples that shine: all of a rectangle, of a disc those inside.
+std::vector<cl_uint> light_rows(LightShape shape)
+{
+    std::vector<cl_uint> rows(LIGHT_SIDE, 0);
+    for (unsigned k = 0; k < LIGHT_SIDE; ++k)
+        for (unsigned i = 0; i < LIGHT_SIDE; ++i) {
+            const auto [u, v] = sample_place(i, k);
+            if (shape == LightShape::rectangle || (2 * u - 1) * (2 * u - 1) + (2 * v - 1) * (2 * v - 1) <= 1) rows[k] |= 1u << i;
+        }
+    return rows;
+}
 
 // One map on its way into patches.
 struct Surfaces {
@@ -89,7 +114,10 @@ PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const Occ
     for (const cl::Buffer& depth : maps.depth) surfaces.push_back(surfaces_of(work, maps, depth, view, program));
 
     const std::size_t texels = count_of(maps.size), count = surfaces.size();
-    PreparedUnion prepared{.texels = {}, .steps = {}, .reach = {}, .patches = {}, .maps = static_cast<int>(count)};
+    PreparedUnion prepared{.texels = {}, .steps = {}, .reach = {}, .patches = {}, .light_rows = {}, .maps = static_cast<int>(count)};
+    const std::vector<cl_uint> rows = light_rows(maps.shape);
+    prepared.light_rows = work.upload(std::span<const cl_uint>(rows), "samples of the light");
+    for (const cl_uint row : rows) prepared.light_samples += std::popcount(row);
     for (const MapSize level : level_sizes(maps.size)) prepared.per_map += count_of(level);
     prepared.texels = work.buffer<cl_float2>(count * texels, "occluder texels");
     prepared.steps = work.buffer<cl_float2>(count * texels, "occluder slopes");
@@ -116,8 +144,8 @@ void shade_union(opencl::Work& work, const PreparedUnion& prepared, const Occlud
     work.launch(union_program(lanes), "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + prepared.patches.bytes(), receivers.view, view, static_cast<cl_int>(prepared.maps),
                 static_cast<cl_int>(prepared.per_map), prepared.nearest, static_cast<float>(shading.bias), static_cast<float>(std::max(shading.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && lanes > 1), static_cast<float>(coarse_per_tolerance * shading.tolerance), prepared.reach,
-                prepared.patches, prepared.texels, prepared.steps, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated,
-                work.stop());
+                prepared.patches, prepared.texels, prepared.steps, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, prepared.light_rows,
+                static_cast<cl_int>(prepared.light_samples), visibility, evaluated, work.stop());
 }
 
 } // namespace penumbra

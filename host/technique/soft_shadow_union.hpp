@@ -13,6 +13,8 @@ struct PreparedUnion {
     opencl::Buffer<cl_float2> texels, steps;
     opencl::Buffer<float> reach; // the patches' greatest disparities
     opencl::Buffer<MicroPatch> patches;
+    opencl::Buffer<cl_uint> light_rows; // which samples of the light shine
+    int light_samples = 0;
     int maps = 0;
     std::size_t per_map = 0; // patches
     float nearest = 0;       // greatest disparity of all; 0: nothing casts
@@ -25,6 +27,7 @@ struct UnionMaps {
     std::span<const int> other;
     MapSize from, size;
     double precision; // relative, of the depths
+    LightShape shape;
 };
 
 opencl::Specialisation union_program(int lanes);

@@ -20,6 +20,10 @@
 // Slope of a receiver whose plane is not known.
 #define NO_PLANE 3.402823466e+38f
 
+// The rows of a light's 32 x 32 samples (light_pattern.clh): bit i of word b is bit b of M(i).
+#define LIGHT_SIDE 32
+#define LIGHT_COLUMN_BITS 0xa5a5a5a5u, 0x99996666u, 0x99999999u, 0x69966996u, 0x66996699u
+
 // Occluder texels beside each other in a block of the depth pyramid, and blocks in a block of the next level.
 #define BLOCK 8
 

@@ -18,7 +18,7 @@ Mask shade(const Light& light, const LightCamera& view, const DepthMap& occluder
     return engine().shade(engine().prepare(light, occluders(view, occluder), technique), r);
 }
 
-const SoftShadowMap front{.sides = Sides::front};
+const SoftShadowMap front{.visibility = PatchVisibility::sum, .sides = Sides::front, .tolerance = 0};
 
 // A scene in which the light's view has tangents of `tangent`, occluders are boxes of texels at depth `z_o` and receivers are the light's
 // own view at depth `z_p`.

@@ -50,6 +50,16 @@ inline oracle::Map read_map(opencl::Work& work, const OccluderMap& map, int widt
     return result;
 }
 
+// One of a union's maps.
+inline oracle::Map read_map(opencl::Work& work, const PreparedUnion& united, int number, int width, int height)
+{
+    const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height), first = static_cast<std::size_t>(number) * count;
+    oracle::Map result{.width = width, .height = height, .texels = {}};
+    const auto texels = work.read(united.texels, first, count), steps = work.read(united.steps, first, count);
+    for (std::size_t i = 0; i < count; ++i) result.texels.push_back({texels[i].s[0], texels[i].s[1], steps[i].s[0], steps[i].s[1]});
+    return result;
+}
+
 inline std::vector<oracle::Receiver> read_points(opencl::Work& work, const ReceiverPoints& points)
 {
     const auto xi = work.read(points.xi), eta = work.read(points.eta), d = work.read(points.d);
@@ -73,7 +83,8 @@ inline SoftRun run(const std::shared_ptr<opencl::Context>& context, const SoftCa
                         .height = c.front.height,
                         .precision = c.front.precision,
                         .front = {},
-                        .back = {}};
+                        .back = {},
+                        .layers = {}};
     const auto front = work.upload(std::span<const float>(c.front.depth), "front");
     depth.front = front.memory();
     opencl::Buffer<float> back;
@@ -91,6 +102,7 @@ inline SoftRun run(const std::shared_ptr<opencl::Context>& context, const SoftCa
     shade_soft_shadow_map(work, prepared, points, visibility.memory(), &result.counts);
 
     for (const auto& side : prepared.sides) result.maps.push_back(read_map(work, side.map, prepared.view.width, prepared.view.height));
+    for (int map = 0; map < prepared.united.maps; ++map) result.maps.push_back(read_map(work, prepared.united, map, prepared.view.width, prepared.view.height));
     result.points = read_points(work, points);
     result.visibility = work.read(visibility);
     result.settings = {.kx = prepared.view.light_scale_x,

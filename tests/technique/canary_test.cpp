@@ -71,7 +71,8 @@ TEST(Canary, ShadowMap)
                                                .height = front.height,
                                                .precision = front.precision,
                                                .front = front_buffer.memory(),
-                                               .back = {}};
+                                               .back = {},
+                                .layers = {}};
             const PreparedShadowMap prepared = prepare_shadow_map(work, occluder_depth, settings);
             const ReceiverPoints points =
                 receiver_points(work, receiver_view(view, depth.width, depth.height, view), depth_buffer.memory(), depth.precision);

@@ -176,8 +176,9 @@ TEST(OccluderMap, PyramidHoldsTheNearest)
                             .height = size.height,
                             .precision = map.precision,
                             .front = uploaded.memory(),
-                            .back = {}};
-        const PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, depth, {.sides = Sides::front});
+                            .back = {},
+                                .layers = {}};
+        const PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, depth, {.visibility = PatchVisibility::sum, .sides = Sides::front, .layers = 0});
         float nearest = 0;
         const auto expect_level = [&](const std::vector<float>& level, int block) {
             const int columns = (size.width + block - 1) / block, rows = (size.height + block - 1) / block;

@@ -86,7 +86,8 @@ std::vector<float> run(const std::shared_ptr<opencl::Context>& context, const Sm
                               .height = front.height,
                               .precision = front.precision,
                               .front = front_buffer.memory(),
-                              .back = {}};
+                              .back = {},
+                                .layers = {}};
     const PreparedSmoothie prepared = prepare_smoothie(work, depth, smoothie_edges(topology, silhouette, view()), c.settings);
     const ReceiverPoints points =
         receiver_points(work, receiver_view(c.camera.value_or(view()), c.receivers.width, c.receivers.height, view()),

@@ -1,4 +1,5 @@
 // The union of micro-patches against samples that are looked at one by one, and against areas that are known.
+#include <bit>
 #include <numbers>
 
 #include "support/device_run.hpp"
@@ -16,11 +17,18 @@ int reversed(int j)
     return result;
 }
 double phase(int k) { return (reversed(k) + 0.5) / side; }                       // of a row, along u
-double column_phase(int i) { return ((19 * reversed(i) + 25) % 32 + 0.5) / side; } // of a column, along v
+// Of a column, along v: a linear map of its number's bits, and 21.
+double column_phase(int i)
+{
+    constexpr int rows[5] = {5, 19, 3, 15, 11};
+    int mapped = 21;
+    for (int bit = 0; bit < 5; ++bit) mapped ^= (std::popcount(static_cast<unsigned>(rows[bit] & i)) & 1) << bit;
+    return (mapped + 0.5) / side;
+}
 
 SoftCase united(const DepthMap& front, const DepthMap& receivers, Sides sides = Sides::front)
 {
-    return {.front = front, .back = {}, .settings = {.visibility = PatchVisibility::united, .sides = sides, .bias = 0}, .receivers = receivers, .camera = {}};
+    return {.front = front, .back = {}, .settings = {.visibility = PatchVisibility::united, .sides = sides, .bias = 0, .tolerance = 0}, .receivers = receivers, .camera = {}};
 }
 
 // What a receiver sees past patches that share no edge: each a rectangle at its own depth, sample by sample. `unsure`: samples that lie within a
@@ -85,7 +93,7 @@ TEST(SoftShadowUnion, PatchesApartHideTheirSamples)
     EXPECT_GT(penumbra, 300);
 }
 
-// A half plane over the samples, against its share of the square: 7/1024, and what the counting of the exact share is off by, 1/512.
+// A half plane over the samples, against its share of the square: 7.6/1024, and what the counting of the exact share is off by, 1/512.
 TEST(SoftShadowUnion, AnEdgeOfAnyDirectionIsResolved)
 {
     // The samples themselves: below the line through the light at distance h from its middle.
@@ -103,7 +111,7 @@ TEST(SoftShadowUnion, AnEdgeOfAnyDirectionIsResolved)
             worst = std::max(worst, std::abs(below / double{side * side} - exact / double{fine * 8 * fine * 8}));
         }
     RecordProperty("worst", std::to_string(worst));
-    EXPECT_LT(worst, 7. / 1024 + 1. / 512);
+    EXPECT_LT(worst, 7.6 / 1024 + 1. / 512);
 }
 
 // One plate, whose texels share edges, at one depth: the exact rectangle.
