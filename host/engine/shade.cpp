@@ -81,7 +81,8 @@ void warn_of_counts(const Prepared::State& state, const ShadeCounts& counts, Rep
     if (counts.uncovered_receivers > 0 && !state.covered)
         report.warnings.push_back(
             std::to_string(counts.uncovered_receivers) + " of " + std::to_string(counts.receivers) +
-            " receivers see part of the light past the occluder map's border: what is not on the map casts no shadow on them");
+            (report.receivers > 0 ? " receivers that were computed see part" : " receivers see part") +
+            " of the light past the occluder map's border: what is not on the map casts no shadow on them");
 }
 
 // A bulb shines in every direction; ours shines to one side, and what lies on the other counts as lit.

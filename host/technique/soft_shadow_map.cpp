@@ -181,8 +181,8 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
 {
     check_together(settings);
     if (settings.visibility == PatchVisibility::sum && depth.light.shape == LightShape::disc)
-        throw Error::at(ErrorCode::unsupported, "light.kind", "is sphere, and soft_shadow_map with visibility sum cannot take one",
-                        "use visibility union, or a rectangle of the same area: half-edges of 0.886 times the radius");
+        throw Error::at(ErrorCode::invalid_input, "technique.visibility", "is sum and the light a sphere",
+                        "expected union, or a rectangle of the same area: half-edges of 0.886 times the radius");
     const MapSize from{depth.width, depth.height};
     const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,

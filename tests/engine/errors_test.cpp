@@ -91,8 +91,8 @@ TEST(EngineErrors, LightsThatATechniqueCannotTake)
 {
     const Occluders o = occluders(light_view(), flat(8, 8, 2));
     const SphereLight sphere{.center = {0, 0, 0}, .radius = 1, .direction = {0, 0, -1}, .up = {}};
-    expect_error(prepare_error(sphere, o, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front}), ErrorCode::unsupported,
-                 {"light.kind", "soft_shadow_map", "sphere", "union", "0.886"});
+    expect_error(prepare_error(sphere, o, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front}), ErrorCode::invalid_input,
+                 {"technique.visibility", "sphere", "union", "0.886"});
     const DirectionalLight sun{.direction = {0, 0, -1}, .angular_diameter_deg = 0.5, .up = {}};
     expect_error(prepare_error(sun, o, front), ErrorCode::unsupported, {"light.kind", "directional"});
     RectangleLight textured = rectangle_light(1, 1);

@@ -222,7 +222,7 @@ void expect(const Scene& changed, const Technique& technique, const Row& row, do
 
 TEST(ForeignDepth, OnReceiversBeforeTrueMeshes)
 {
-    for (const Technique& technique : {Technique(RayTraced{.samples = 64}), Technique(SoftShadowMap{}), Technique(OcclusionTexture{})}) {
+    for (const Technique& technique : {Technique(RayTraced{.samples = 64}), Technique(SoftShadowMap{}), Technique(SoftShadowMap{.visibility = PatchVisibility::sum, .tolerance = 0}), Technique(SoftShadowMap{.tolerance = 0}), Technique(OcclusionTexture{})}) {
         const double own = figures_of(mask_of(scene(), technique), truth(), rendered(1)).mean;
         for (const Row& row : rows()) {
             Scene changed = scene();

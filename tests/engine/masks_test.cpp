@@ -33,15 +33,17 @@ std::string warnings_of(const Light& light, const Occluders& o, const Receivers&
 TEST(Warnings, ReceiversThatSeePastTheMap)
 {
     const Occluders o = occluders(light_view(0.5), boxes(64, 64, 4, {{24, 40, 24, 40}}));
+    const SoftShadowMap whole{.sides = Sides::front, .tolerance = 0};
     // The whole penumbra lies inside a view of a sixteenth of the map's.
     EXPECT_EQ(warnings_of(rectangle_light(0.1, 0.1), o, receivers(light_view(0.03), flat(16, 16, 8)), front), "");
     // The receivers' view is twice as wide as the map's: those outside it see the light past its border, and some of those inside.
-    const std::string warning = warnings_of(rectangle_light(0.1, 0.1), o, receivers(light_view(1), flat(16, 16, 8)), front);
+    const std::string warning = warnings_of(rectangle_light(0.1, 0.1), o, receivers(light_view(1), flat(16, 16, 8)), whole);
     const int count = std::stoi(warning);
     EXPECT_TRUE(holds(warning, "of 256 receivers")) << warning;
     // The light's image at depth 4 is 0.1 / 2 wide each way, in a map of 2 each way: all pixels with a centre beyond 0.475 of the view.
     // Centres are at (2 i + 1) / 16: 3.8 columns and rows of 8 on either side are inside, so 8 x 8 of 256.
     EXPECT_EQ(count, 256 - 8 * 8) << warning;
+    EXPECT_TRUE(holds(warnings_of(rectangle_light(0.1, 0.1), o, receivers(light_view(1), flat(16, 16, 8)), front), "receivers that were computed see part"));
     // With nothing between them and the light there is nothing to miss.
     EXPECT_EQ(warnings_of(rectangle_light(0.1, 0.1), o, receivers(light_view(1), flat(16, 16, 3)), front), "");
 }
@@ -110,21 +112,20 @@ TEST(EngineReport, AddsUp)
     EXPECT_GT(report.peak_device_bytes, 0u);
 }
 
-// 20 bytes a receiver (depth, place, visibility) and 20 a texel of each map (depth, texel, steps), their padding, and a 64th for
-// tiles and pyramids.
+// 20 bytes a receiver (depth, place, visibility) and of the sum 20 a texel of each map (depth, texel, steps); of the union 32 (texel and steps, of the map and among all
+// maps) and 4/3 of 68 (patches of every level). Their padding, and a 64th for tiles and pyramids.
 TEST(EngineReport, MemoryGrowsWithTheMapsAndNoFaster)
 {
     for (const auto& [texels, pixels] : {std::pair{64, 1024}, {1024, 64}, {512, 512}, {61, 93}}) {
         Occluders o = occluders(light_view(), flat(texels, texels, 4));
         o.back = o.front;
-        const Report report =
-            engine()
-                .mask(scene_of(rectangle_light(0.01, 0.01), o, receivers(light_view(), flat(pixels, pixels, 8))), SoftShadowMap{})
-                .report;
         const double padded = (pixels + 15.0) * (pixels + 7.0), map = static_cast<double>(texels) * texels;
-        EXPECT_LE(static_cast<double>(report.peak_device_bytes), (20 * padded + 2 * 20 * map) * (1 + 1.0 / 64) + 4096)
-            << texels << ", " << pixels;
-        EXPECT_GE(static_cast<double>(report.peak_device_bytes), 4.0 * pixels * pixels);
+        for (const auto& [visibility, bytes] : {std::pair{PatchVisibility::sum, 20.0}, {PatchVisibility::united, 32 + 68 * 4 / 3.0}}) {
+            const SoftShadowMap technique{.visibility = visibility, .tolerance = 0};
+            const Report report = engine().mask(scene_of(rectangle_light(0.01, 0.01), o, receivers(light_view(), flat(pixels, pixels, 8))), technique).report;
+            EXPECT_LE(static_cast<double>(report.peak_device_bytes), (20 * padded + 2 * bytes * map) * (1 + 1.0 / 64) + 4096) << texels << ", " << pixels;
+            EXPECT_GE(static_cast<double>(report.peak_device_bytes), 4.0 * pixels * pixels);
+        }
     }
 }
 

@@ -291,7 +291,7 @@ TEST(WedgesFromDepth, CloseToMeshCasters)
         for (const int texels : {64, 128, 256}) {
             Scene wanted = meshes;
             wanted.occluders = {.camera = light_view(0.6), .width = texels, .height = texels, .front = {}, .back = {}, .layers = {}};
-            const Scene rendered = with_depth(wanted, SoftShadowMap{.sides = Sides::front});
+            const Scene rendered = with_depth(wanted, SoftShadowMap{.sides = Sides::front, .layers = 0});
             Scene maps = scene_of(rectangle_light(0.5, 0.5), {}, floor_at(8, 64));
             maps.occluders = rendered.occluders;
             const Image mask = mask_of(maps);

@@ -30,7 +30,7 @@ TEST(Stop, EndsAKernelThatRuns)
 {
     const Engine engine;
     const Scene scene = endless();
-    const SoftShadowMap technique{.sides = Sides::front};
+    const SoftShadowMap technique{.sides = Sides::front, .tolerance = 0};
     // Without waiting for the kernel to be built.
     Scene warm = scene;
     warm.receivers = {.camera = light_view(0.1), .width = 8, .height = 8, .depth = flat(8, 8, 0.5)};

@@ -43,7 +43,7 @@ DepthMap mirrored(const DepthMap& map)
 
 // Without the self-shadow bound: in maps of random depths a texel's neighbours may look like one steep surface that reaches to the
 // receivers.
-Mask mask_of(const World& w, const Technique& technique = SoftShadowMap{.bias = 0})
+Mask mask_of(const World& w, const Technique& technique = SoftShadowMap{.visibility = PatchVisibility::sum, .bias = 0, .tolerance = 0})
 {
     const Engine engine;
     Occluders o = occluders(light_view(w.tangent_x, w.tangent_y), scaled(w.front, w.scale));
