@@ -99,17 +99,18 @@ SharedBytes Service::read_body(const Request& request)
     return body;
 }
 
-Gate::Guard Service::enter_slot()
+Gate::Slot Service::enter_slot()
 {
     const auto waiting = Deadline::Clock::now();
-    Gate::Guard slot = gate_.enter(Connection::current().request());
+    Gate::Slot slot = gate_.enter(Connection::current().request());
     const double wait_s = seconds_since(waiting);
     Connection::current().cost.queue_ms = wait_s * 1000;
     metrics_.observe("penumbra_queue_wait_seconds", "", wait_s);
     return slot;
 }
 
-template <class Digest> CallReply Service::computed(const Call& call, std::span<const int> files, Message& message, const Digest& digest)
+template <class Digest>
+CallReply Service::computed(Gate::Slot& slot, const Call& call, std::span<const int> files, Message& message, const Digest& digest)
 {
     const Deadline& deadline = Connection::current().request();
     if (crashes_.any()) crashes_.check(digest());
@@ -118,7 +119,7 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
     Call timed = call;
     timed.seconds = std::max(std::chrono::duration<double>(deadline.end() - Deadline::Clock::now()).count(), 0.0);
     try {
-        message = worker.call(text_of(timed), files, deadline);
+        message = worker.call(text_of(timed), files, deadline, [&] { return slot.step_aside(); });
     } catch (const Problem& problem) {
         if (problem.reason == "crashed") {
             const std::string name = digest();
@@ -149,11 +150,11 @@ void Service::post_mask(const Request& request, Response& response)
     const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{body.descriptor()};
     Message message;
     const Call call{.kind = Call::Kind::mask, .form = form, .choice = choice, .format = std::string(format.format)};
-    send_mask(response, computed(call, files, message, content), message, format);
+    send_mask(response, computed(slot, call, files, message, content), message, format);
     tag.set_on(response);
 }
 
@@ -168,10 +169,10 @@ void Service::post_scene(const Request& request, Response& response)
     auto scene = scenes_.find(id, true);
     response.status = scene ? 200 : 201;
     if (!scene) {
-        const auto slot = enter_slot();
+        auto slot = enter_slot();
         const std::array files{body.descriptor()};
         Message message;
-        const CallReply answer = computed({.kind = Call::Kind::keep, .form = form, .id = id}, files, message, [&] { return id; });
+        const CallReply answer = computed(slot, {.kind = Call::Kind::keep, .form = form, .id = id}, files, message, [&] { return id; });
         connection.cost.decode_ms = answer.decode_ms;
         scene = std::make_shared<KeptUpload>(id, std::move(body), form, answer.scene.value(), [this, id] { pool_.forget(id); });
         scenes_.keep(scene);
@@ -189,10 +190,10 @@ void Service::post_depth(const Request& request, Response& response)
     const std::string form = boundary_of(connection.content_type);
     const auto parts = parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{body.descriptor()};
     Message message;
-    const CallReply answer = computed({.kind = Call::Kind::depth, .form = form, .side = side}, files, message, [&] { return id_of(parts); });
+    const CallReply answer = computed(slot, {.kind = Call::Kind::depth, .form = form, .side = side}, files, message, [&] { return id_of(parts); });
     if (message.files.empty()) throw Error(ErrorCode::internal, "a worker's answer without its depth");
     response.status = 200;
     response.set_header("Penumbra-Size", std::to_string(answer.width) + "x" + std::to_string(answer.height));
@@ -223,7 +224,7 @@ void Service::post_kept_mask(const Request& request, Response& response)
     const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{scene->body().descriptor(), body.descriptor()};
     Message message;
     const Call call{.kind = Call::Kind::kept,
@@ -232,7 +233,7 @@ void Service::post_kept_mask(const Request& request, Response& response)
                     .patch_form = form,
                     .choice = choice,
                     .format = std::string(format.format)};
-    CallReply answer = computed(call, files, message, content);
+    CallReply answer = computed(slot, call, files, message, content);
     if (answer.scene) scene->set_size(*answer.scene);
     send_mask(response, std::move(answer), message, format);
     tag.set_on(response);

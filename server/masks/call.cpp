@@ -125,7 +125,8 @@ std::string text_of(const Greeting& greeting)
                         {"devices", greeting.devices_json},
                         {"warnings", cut(greeting.warnings)},
                         {"closed", greeting.closed},
-                        {"memory", greeting.memory}});
+                        {"memory", greeting.memory},
+                        {"kernels", greeting.kernels}});
 }
 
 Greeting greeting_from(std::string_view text)
@@ -138,7 +139,8 @@ Greeting greeting_from(std::string_view text)
             .devices_json = json.at("devices"),
             .warnings = json.at("warnings"),
             .closed = json.at("closed"),
-            .memory = json.at("memory")};
+            .memory = json.at("memory"),
+            .kernels = json.at("kernels")};
 }
 
 } // namespace penumbra::server

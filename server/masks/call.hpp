@@ -56,6 +56,7 @@ struct Greeting {
     std::vector<std::string> warnings = {};
     std::vector<std::string> closed = {}; // what the kernel keeps from it
     std::uint64_t memory = 0;             // bytes that it may take
+    std::string kernels = {};             // the folder where PoCL keeps its own
 };
 
 // Texts are cut where they would be longer than a message.

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 #include <optional>
+#include <system_error>
 #include <thread>
 
 #include <sys/prctl.h>
@@ -43,7 +45,8 @@ class Worker {
 public:
     Worker(const Options& options, const Engine& engine)
         : options_(options), engine_(engine),
-          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), worker_memory(options) / 4),
+          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes) / (static_cast<std::uint64_t>(options.slots) + spare_workers(options)),
+                           worker_memory(options) / 4),
                   static_cast<std::size_t>(options.scenes), std::chrono::seconds(options.scenes_s))
     {
     }
@@ -207,17 +210,22 @@ template <class Call> CallReply guarded(const Call& call, std::uint64_t memory)
 }
 
 // What strangers' bytes must not reach is closed before any comes.
-Greeting greet(const Options& options, const std::string& temporary, std::optional<Engine>& engine)
+Greeting greet(const Options& options, bool own_kernels, const std::string& temporary, std::optional<Engine>& engine)
 {
     Greeting greeting;
     if (leave_network()) greeting.closed.emplace_back("the network (a namespace)");
     prctl(PR_SET_PDEATHSIG, SIGKILL); // after what changes rights, which takes it back
     greeting.memory = worker_memory(options);
     limit_memory(greeting.memory);
+    if (own_kernels) {
+        setenv("PENUMBRA_CACHE_DIR", own_cache(temporary).c_str(), 1);
+        unsetenv("POCL_CACHE_DIR");
+    }
     prepare_environment();
-    // After the folder of kernels was chosen, which all workers share.
+    if (const char* const folder = std::getenv("POCL_CACHE_DIR")) greeting.kernels = folder; // as was just chosen
+    // After the folder of kernels was chosen.
     if (!temporary.empty()) setenv("TMPDIR", temporary.c_str(), 1);
-    if (close_files(folders_of_a_worker(temporary))) greeting.closed.emplace_back("files (Landlock)");
+    if (close_files(folders_of_a_worker(temporary, !own_kernels))) greeting.closed.emplace_back("files (Landlock)");
     if (close_calls()) greeting.closed.emplace_back("sockets and system calls (seccomp)");
     engine.emplace(options.device.empty() ? Engine() : Engine(options.device));
     const DeviceInfo device = engine->device();
@@ -230,12 +238,16 @@ Greeting greet(const Options& options, const std::string& temporary, std::option
 
 } // namespace
 
-int work(const Options& options, const std::string& temporary, Channel channel)
+std::string own_cache(const std::string& temporary) { return temporary + "/cache"; }
+
+int work(const Options& options, Kernels kernels, const std::string& temporary, Channel channel)
 {
+    std::error_code unknown;
+    const bool own_kernels = kernels == Kernels::own && std::filesystem::is_directory(own_cache(temporary), unknown);
     std::optional<Engine> engine;
     Greeting greeting;
     try {
-        greeting = greet(options, temporary, engine);
+        greeting = greet(options, own_kernels, temporary, engine);
     } catch (const Error& error) {
         greeting.problem = error.what();
         greeting.code = static_cast<int>(error.code());

@@ -16,6 +16,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "process/priority.hpp"
 #include "process/problem.hpp"
 #include "process/wait.hpp"
 
@@ -26,7 +27,6 @@ namespace {
 
 // Between two starts of a worker that dies again and again.
 constexpr std::chrono::milliseconds first_pause{100}, longest_pause{10000};
-constexpr std::chrono::minutes longest_start{10}; // kernels may have to be built
 
 std::string death_of(int status)
 {
@@ -55,7 +55,8 @@ struct WorkerPool::Worker {
     std::chrono::milliseconds pause{0};
 };
 
-WorkerPool::WorkerPool(PoolOptions options, Say say) : options_(std::move(options)), say_(std::move(say)), folder_(new_folder())
+WorkerPool::WorkerPool(PoolOptions options, Say say)
+    : options_(std::move(options)), say_(std::move(say)), folder_(new_folder()), raises_(may_raise_priority())
 {
     for (std::size_t i = 0; i < options_.workers; ++i) {
         workers_.push_back(std::make_unique<Worker>());
@@ -95,54 +96,110 @@ std::string WorkerPool::folder_of(const Worker& worker) const
     return folder_.empty() ? std::string() : folder_ + "/" + std::to_string(worker.number);
 }
 
-Message WorkerPool::start()
+std::string WorkerPool::start()
 {
     std::unique_lock lock(mutex_);
     supervisor_ = std::thread([this] { supervise(); });
-    changed_.wait(lock, [&] { return greeting_ || no_greeting_; });
-    if (no_greeting_) std::rethrow_exception(no_greeting_);
-    return std::move(*greeting_);
+    changed_.wait(lock, [&] { return !greeting_.empty() || failure_; });
+    if (greeting_.empty()) std::rethrow_exception(failure_);
+    return greeting_;
 }
 
-// Starts dead workers, one after another; the first alone until it has said its greeting.
-void WorkerPool::supervise()
+void WorkerPool::wait_until_warm(std::size_t workers)
 {
     std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return warmed_ >= workers || failure_ || over(); });
+    if (over()) throw service_ends();
+    if (failure_) std::rethrow_exception(failure_);
+}
+
+// Starts the builder, then dead workers, one after another.
+void WorkerPool::supervise()
+{
+    constexpr std::chrono::milliseconds look{100}; // for those that died idle
+    const bool built = build();
+    std::unique_lock lock(mutex_);
     while (!ending_) {
+        bury_the_dead();
         Clock::time_point when = Clock::time_point::max();
-        Worker* const worker = no_greeting_ ? nullptr : next_dead(when);
+        Worker* const worker = built && !failure_ && !over() ? next_dead(when) : nullptr;
         if (!worker) {
-            if (when == Clock::time_point::max())
-                changed_.wait(lock);
-            else
-                changed_.wait_until(lock, when);
+            changed_.wait_until(lock, std::min(when, Clock::now() + look));
             continue;
         }
         worker->state = State::starting;
         lock.unlock();
-        std::exception_ptr failure;
-        Message greeting;
-        try {
-            spawn(*worker);
-            // The end of the service ends the wait too.
-            for (auto got = Channel::Got::late; got != Channel::Got::message;) {
-                got = worker->channel.receive(greeting, Clock::now() + std::chrono::milliseconds(100));
-                const std::scoped_lock again(mutex_);
-                if (ending_ || got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
-            }
-        } catch (...) {
-            failure = std::current_exception();
-        }
+        const std::exception_ptr failure = bring_up(*worker, false);
         lock.lock();
         if (failure) {
-            bury(*worker, false);
-            if (!greeting_) no_greeting_ = failure;
+            bury(*worker, End::crashed);
+            if (warmed_ == 0) failure_ = failure;
         } else {
             worker->state = State::idle;
             ++counts_.started;
-            if (!greeting_) greeting_ = std::move(greeting);
+            ++warmed_;
         }
         changed_.notify_all();
+    }
+}
+
+// A process of its own, which ends before anybody asks for anything. It alone may write to the folder of kernels that all share.
+bool WorkerPool::build()
+{
+    Worker builder;
+    builder.number = options_.workers;
+    const std::exception_ptr failure = bring_up(builder, true);
+    const std::scoped_lock lock(mutex_);
+    if (failure) failure_ = failure;
+    bury(builder, failure ? End::crashed : End::retired);
+    changed_.notify_all();
+    return !failure;
+}
+
+bool WorkerPool::any_idle() const
+{
+    return std::ranges::any_of(workers_, [](const auto& worker) { return worker->state == State::idle; });
+}
+
+// Waits for a message of one that starts. The end of the service ends the wait too. While others are free it has time, and leaves them theirs.
+void WorkerPool::await(Worker& worker, Message& message, bool& lowered)
+{
+    constexpr int steps = 10; // of nice(2): a ninth of what the others get, where they want all
+    for (;;) {
+        const auto got = worker.channel.receive(message, Clock::now() + std::chrono::milliseconds(50));
+        if (got == Channel::Got::message) return;
+        const std::scoped_lock lock(mutex_);
+        if (over()) throw service_ends();
+        if (got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
+        if (raises_ && any_idle() != lowered) {
+            lowered = !lowered;
+            lower_priority(worker.process, lowered ? steps : 0);
+        }
+    }
+}
+
+// Gives what kept it from being ready.
+std::exception_ptr WorkerPool::bring_up(Worker& worker, bool builder)
+{
+    try {
+        bool lowered = false;
+        spawn(worker, builder);
+        Message message;
+        await(worker, message, lowered);
+        if (builder) {
+            const std::scoped_lock lock(mutex_);
+            greeting_ = message.text;
+            changed_.notify_all();
+        }
+        if (!options_.warm.empty()) {
+            if (!worker.channel.send(options_.warm)) throw Problem(503, "no_worker", "a worker ended before it was warm");
+            await(worker, message, lowered);
+            options_.warmed(message);
+        }
+        if (lowered) lower_priority(worker.process, 0);
+        return nullptr;
+    } catch (...) {
+        return std::current_exception();
     }
 }
 
@@ -156,13 +213,14 @@ WorkerPool::Worker* WorkerPool::next_dead(Clock::time_point& when)
     return nullptr;
 }
 
-void WorkerPool::spawn(Worker& worker)
+void WorkerPool::spawn(Worker& worker, bool builder)
 {
     auto [ours, theirs] = Channel::pair();
     const std::string folder = folder_of(worker);
     std::error_code ignored; // a worker without a folder takes no meshes, and says so
     if (!folder.empty()) std::filesystem::create_directory(folder, ignored);
-    std::vector<std::string> words{options_.program, "--worker=" + folder};
+    if (!builder) options_.furnish(folder, greeting_);
+    std::vector<std::string> words{options_.program, (builder ? "--builder=" : "--worker=") + folder};
     words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());
@@ -185,16 +243,16 @@ void WorkerPool::spawn(Worker& worker)
 }
 
 // With the mutex. The process ends, its place is free to be taken again.
-void WorkerPool::bury(Worker& worker, bool overdue)
+void WorkerPool::bury(Worker& worker, End end)
 {
     if (worker.process > 0) {
         kill(worker.process, SIGKILL);
         int status = 0;
         while (waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
         }
-        if (overdue)
+        if (end == End::overdue)
             ++counts_.overdue;
-        else if (!ending_) {
+        else if (end == End::crashed && !over()) {
             ++counts_.crashed;
             say_death(worker, status);
         }
@@ -221,7 +279,7 @@ void WorkerPool::bury_the_dead()
         if (worker->state != State::idle) continue;
         pollfd channel{worker->channel.descriptor(), POLLIN, 0};
         if (::poll(&channel, 1, 0) <= 0) continue;
-        bury(*worker, false);
+        bury(*worker, End::crashed);
         changed_.notify_all();
     }
 }
@@ -255,29 +313,51 @@ WorkerPool::Lease WorkerPool::lease(std::string_view name, const Deadline& deadl
     return {*this, *best};
 }
 
-WorkerPool::Lease WorkerPool::lease_number(std::size_t number, const Deadline& deadline)
-{
-    std::unique_lock lock(mutex_);
-    Worker& worker = *workers_.at(number);
-    if (!changed_.wait_until(lock, deadline.end(), [&] { return worker.state == State::idle || over(); }) || over()) {
-        if (over()) throw service_ends();
-        throw Problem(503, "no_worker", "worker " + std::to_string(number) + " did not start in time", 5);
-    }
-    worker.state = State::busy;
-    return {*this, worker};
-}
-
 WorkerPool::Lease::~Lease()
 {
     if (!worker_) return;
-    {
-        const std::scoped_lock lock(pool_->mutex_);
-        if (worker_->state == State::busy) worker_->state = State::idle;
-    }
+    give_back();
     pool_->changed_.notify_all();
 }
 
-Message WorkerPool::Lease::call(std::string_view text, std::span<const int> files, const Deadline& deadline)
+void WorkerPool::Lease::give_back()
+{
+    const std::scoped_lock lock(pool_->mutex_);
+    if (worker_->state != State::busy) return;
+    worker_->state = State::idle;
+    // One whose priority stays low serves nobody well any more.
+    if (lowered_ && !(pool_->raises_ && lower_priority(worker_->process, 0))) pool_->bury(*worker_, End::retired);
+}
+
+// Waits for the answer. The longer it takes, the more it leaves to others.
+Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, const std::function<bool()>& is_long)
+{
+    const auto begun = Clock::now();
+    auto step = steps_down.begin();
+    bool said = !is_long;
+    for (;;) {
+        const auto now = Clock::now();
+        Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
+        {
+            const std::scoped_lock lock(pool_->mutex_);
+            end = std::min(end, pool_->end_);
+        }
+        if (now >= end) return Channel::Got::late;
+        if (step != steps_down.end() && now - begun >= step->after) {
+            lower_priority(worker_->process, step++->steps);
+            lowered_ = true;
+        }
+        if (!said && now - begun >= long_call) said = is_long();
+        // The service's end is looked for now and then: it shortens the wait.
+        end = std::min(end, now + std::chrono::milliseconds(100));
+        if (step != steps_down.end()) end = std::min(end, begun + step->after);
+        const auto got = worker_->channel.receive(answer, end);
+        if (got != Channel::Got::late) return got;
+    }
+}
+
+Message WorkerPool::Lease::call(std::string_view text, std::span<const int> files, const Deadline& deadline,
+                                const std::function<bool()>& is_long)
 {
     Worker& worker = *worker_;
     std::vector<std::string> to_forget;
@@ -290,25 +370,14 @@ Message WorkerPool::Lease::call(std::string_view text, std::span<const int> file
     for (const std::string& name : to_forget) there = there && worker.channel.send("forget" + name);
     there = there && worker.channel.send(text, files);
     Message answer;
-    auto got = there ? Channel::Got::late : Channel::Got::ended;
-    while (got == Channel::Got::late) {
-        const auto now = Clock::now();
-        Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
-        {
-            const std::scoped_lock lock(pool_->mutex_);
-            end = std::min(end, pool_->end_);
-        }
-        if (now >= end) break;
-        // The service's end is looked for now and then: it shortens the wait.
-        got = worker.channel.receive(answer, std::min(end, now + std::chrono::milliseconds(100)));
-    }
+    const auto got = there ? wait(answer, deadline, is_long) : Channel::Got::ended;
     const std::scoped_lock lock(pool_->mutex_);
     if (got == Channel::Got::message) {
         worker.used = pool_->finished_ = Clock::now();
         return answer;
     }
     const bool late = got == Channel::Got::late, ended = Clock::now() >= pool_->end_;
-    pool_->bury(worker, late);
+    pool_->bury(worker, late ? End::overdue : End::crashed);
     pool_->changed_.notify_all();
     if (ended) throw service_ends();
     if (late) throw deadline.over();
