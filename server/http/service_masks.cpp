@@ -131,6 +131,7 @@ CallReply Service::computed(Gate::Slot& slot, const Call& call, std::span<const 
     if (!call.id.empty()) worker.keeps(call.id);
     if (crashes_.any()) crashes_.absolve(digest());
     CallReply answer = reply_from(message.text);
+    if (answer.spent) worker.retire();
     Connection::current().cost.worker_ms = seconds_since(calling) * 1000;
     if (!answer.problem) return answer;
     Connection::current().inside = answer.inside;

@@ -46,6 +46,7 @@ struct CallReply {
     double decode_ms = 0;
     std::optional<SceneFacts> scene = {};
     int width = 0, height = 0; // of the receivers, with a depth view
+    bool spent = false;        // the worker holds on to much memory: another one should take its place
 };
 
 // Who a worker is: its first message.

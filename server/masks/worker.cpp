@@ -25,6 +25,7 @@
 #include "masks/work_limits.hpp"
 #include "process/confinement.hpp"
 #include "process/memory.hpp"
+#include "process/own_memory.hpp"
 #include "process/ready.hpp"
 #include "process/shared_bytes.hpp"
 #include "process/watch.hpp"
@@ -52,6 +53,7 @@ public:
     }
 
     void forget(std::string_view id) { scenes_.forget(id); }
+    std::uint64_t kept_bytes() { return scenes_.counts().bytes; }
 
     // `bytes`: what goes beside the answer.
     CallReply answer(const Call& call, std::vector<Descriptor> files, Descriptor& bytes)
@@ -244,6 +246,7 @@ int work(const Options& options, Kernels kernels, const std::string& temporary, 
 {
     std::error_code unknown;
     const bool own_kernels = kernels == Kernels::own && std::filesystem::is_directory(own_cache(temporary), unknown);
+    give_back_large_blocks();
     std::optional<Engine> engine;
     Greeting greeting;
     try {
@@ -255,14 +258,17 @@ int work(const Options& options, Kernels kernels, const std::string& temporary, 
     if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
 
     Worker worker(options, *engine);
+    std::optional<Retention> retention; // from the first call on, which warms it
     for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
         if (message.text.starts_with("forget")) {
             worker.forget(std::string_view(message.text).substr(6));
             continue;
         }
         Descriptor bytes;
-        const CallReply answer =
+        CallReply answer =
             guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
+        if (!retention) retention.emplace(greeting.memory);
+        answer.spent = retention->too_much(worker.kept_bytes());
         const int file = bytes.get();
         if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
     }

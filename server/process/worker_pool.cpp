@@ -265,7 +265,7 @@ void WorkerPool::bury(Worker& worker, End end)
     worker.to_forget.clear();
     worker.state = State::dead;
     // One that served for a while starts again at once.
-    const bool young = worker.used == Clock::time_point::min();
+    const bool young = end == End::crashed && worker.used == Clock::time_point::min();
     worker.pause = young ? std::clamp(worker.pause * 2, first_pause, longest_pause) : std::chrono::milliseconds(0);
     worker.not_before = Clock::now() + worker.pause;
     worker.used = Clock::time_point::min();
@@ -326,7 +326,8 @@ void WorkerPool::Lease::give_back()
     if (worker_->state != State::busy) return;
     worker_->state = State::idle;
     // One whose priority stays low serves nobody well any more.
-    if (lowered_ && !(pool_->raises_ && lower_priority(worker_->process, 0))) pool_->bury(*worker_, End::retired);
+    const bool stays_low = lowered_ && !(pool_->raises_ && lower_priority(worker_->process, 0));
+    if (retired_ || stays_low) pool_->bury(*worker_, End::retired);
 }
 
 // Waits for the answer. The longer it takes, the more it leaves to others.

@@ -63,7 +63,10 @@ public:
     class Lease {
     public:
         Lease(WorkerPool& pool, Worker& worker) : pool_(&pool), worker_(&worker) {}
-        Lease(Lease&& other) noexcept : pool_(other.pool_), worker_(std::exchange(other.worker_, nullptr)) {}
+        Lease(Lease&& other) noexcept
+            : pool_(other.pool_), worker_(std::exchange(other.worker_, nullptr)), lowered_(other.lowered_), retired_(other.retired_)
+        {
+        }
         Lease& operator=(Lease&&) = delete;
         ~Lease();
 
@@ -72,6 +75,8 @@ public:
         Message call(std::string_view text, std::span<const int> files, const Deadline& deadline, const std::function<bool()>& is_long = {});
         // That the worker keeps what belongs to this name now, or does no longer.
         void keeps(const std::string& name);
+        // That it is to end when it is given back; another takes its place.
+        void retire() { retired_ = true; }
 
     private:
         void give_back();
@@ -79,7 +84,7 @@ public:
 
         WorkerPool* pool_;
         Worker* worker_;
-        bool lowered_ = false;
+        bool lowered_ = false, retired_ = false;
     };
 
     // Starts a process that builds what is missing, waits for its greeting, and gives that. It ends when it is warm, and the workers start. Throws
