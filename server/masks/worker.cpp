@@ -40,12 +40,25 @@ const MaskFormat& format_named(std::string_view format)
     return mask_formats().front();
 }
 
+// Libraries load what they need when the first image of a format comes: some 100 MiB, of a request's share. Rather now.
+void warm_formats(const std::string& temporary)
+{
+    if (temporary.empty()) return;
+    const Image image{.width = 16, .height = 16, .channels = 1, .pixels = std::vector<float>(256, 0.5F)};
+    for (const MaskFormat& format : mask_formats()) {
+        const std::string path = temporary + "/warm." + std::string(format.format);
+        write_image(path, image, {.format = std::string(format.format)});
+        if (read_image(path).pixels.size() != image.pixels.size()) throw Error(ErrorCode::internal, std::string(format.format) + ": an image came back otherwise");
+        std::filesystem::remove(path);
+    }
+}
+
 double milliseconds_since(Deadline::Clock::time_point begin) { return seconds_since(begin) * 1000; }
 
 class Worker {
 public:
-    Worker(const Options& options, const Engine& engine)
-        : options_(options), engine_(engine),
+    Worker(const Options& options, const Engine& engine, std::string temporary)
+        : options_(options), engine_(engine), temporary_(std::move(temporary)),
           scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes) / (static_cast<std::uint64_t>(options.slots) + spare_workers(options)),
                            worker_memory(options) / 4),
                   static_cast<std::size_t>(options.scenes), std::chrono::seconds(options.scenes_s))
@@ -92,6 +105,7 @@ private:
         case Call::Kind::warm:
             check_known_mask(engine_);
             warm(engine_);
+            warm_formats(temporary_);
             return {};
         case Call::Kind::mask:
             return mask(call, shared[0], deadline, bytes);
@@ -187,6 +201,7 @@ private:
 
     const Options& options_;
     const Engine& engine_;
+    const std::string temporary_; // folder
     Watch watch_;
     SceneStore scenes_;
 };
@@ -257,7 +272,7 @@ int work(const Options& options, Kernels kernels, const std::string& temporary, 
     }
     if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
 
-    Worker worker(options, *engine);
+    Worker worker(options, *engine, temporary);
     std::optional<Retention> retention; // from the first call on, which warms it
     for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
         if (message.text.starts_with("forget")) {

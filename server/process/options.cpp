@@ -81,8 +81,8 @@ const std::array rows{
     OptionRow{"slots", "requests", "requests that are decoded, computed and encoded at the same time", {1, 256}, &Options::slots},
     OptionRow{"spares",
               "workers",
-              "workers kept warm beside those of the slots: one takes the place of a worker that died, or of one that is busy for longer than half "
-              "a second, which goes on at low priority. Fewer where memory is short",
+              "workers kept warm beside those of the slots: one takes the place of a worker that died, or of one that is busy for longer than a "
+              "quarter of a second, which goes on at low priority. Fewer where memory is short",
               {0, 256},
               &Options::spares},
     OptionRow{

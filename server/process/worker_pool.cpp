@@ -156,12 +156,16 @@ bool WorkerPool::build()
     return !failure;
 }
 
-bool WorkerPool::any_idle() const
+// With the mutex: whether more are free than are missing.
+bool WorkerPool::has_time() const
 {
-    return std::ranges::any_of(workers_, [](const auto& worker) { return worker->state == State::idle; });
+    const auto in = [&](auto... states) {
+        return std::ranges::count_if(workers_, [&](const auto& worker) { return ((worker->state == states) || ...); });
+    };
+    return in(State::idle) > in(State::dead, State::starting);
 }
 
-// Waits for a message of one that starts. The end of the service ends the wait too. While others are free it has time, and leaves them theirs.
+// Waits for a message of one that starts. The end of the service ends the wait too. Where it is not missed it leaves its time to the others.
 void WorkerPool::await(Worker& worker, Message& message, bool& lowered)
 {
     constexpr int steps = 10; // of nice(2): a ninth of what the others get, where they want all
@@ -171,7 +175,7 @@ void WorkerPool::await(Worker& worker, Message& message, bool& lowered)
         const std::scoped_lock lock(mutex_);
         if (over()) throw service_ends();
         if (got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
-        if (raises_ && any_idle() != lowered) {
+        if (raises_ && has_time() != lowered) {
             lowered = !lowered;
             lower_priority(worker.process, lowered ? steps : 0);
         }

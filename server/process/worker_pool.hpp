@@ -41,8 +41,9 @@ struct Step {
     std::chrono::milliseconds after;
     int steps; // of nice(2)
 };
-constexpr std::array<Step, 3> steps_down{{{std::chrono::milliseconds(250), 4}, {std::chrono::milliseconds(500), 8}, {std::chrono::milliseconds(1000), 12}}};
-constexpr std::chrono::milliseconds long_call{500}; // and then it does so beside the slots, if it may
+constexpr std::array<Step, 4> steps_down{{{std::chrono::milliseconds(125), 3}, {std::chrono::milliseconds(250), 6}, {std::chrono::milliseconds(500), 10},
+                                           {std::chrono::milliseconds(1000), 14}}};
+constexpr std::chrono::milliseconds long_call{250}; // and then it does so beside the slots, if it may
 
 class WorkerPool {
 public:
@@ -115,7 +116,7 @@ private:
     bool build();
     std::exception_ptr bring_up(Worker& worker, bool builder);
     void await(Worker& worker, Message& message, bool& lowered);
-    bool any_idle() const;
+    bool has_time() const;
     void spawn(Worker& worker, bool builder);
     void bury_the_dead();
     void bury(Worker& worker, End end);

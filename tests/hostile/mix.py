@@ -23,8 +23,9 @@ import time
 import bombs
 from service import Service, Visitor, form, post
 
-MEMORY = 3000  # MiB
-SPARES = 3  # one for each request that goes on for long, and one for a worker that was killed
+MEMORY = 4000  # MiB
+SLOTS = 3
+SPARES = 4  # for two loops, a bomb, and a worker that was killed
 
 
 def honest_requests():
@@ -180,7 +181,9 @@ def main():
     options = arguments.parse_args()
     wrong, expected = [], {}
     print("| time | honest requests | answers | ms: median | 99 % | MiB, at most |\n| --- | --- | --- | --- | --- | --- |", flush=True)
-    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 15, "--rays", 1 << 40, "--slots", 3, "--spares", SPARES) as service:
+    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 15, "--rays", 1 << 40, "--slots", SLOTS, "--spares", SPARES) as service:
+        while service.metric('penumbra_workers{state="idle"}') < SLOTS + SPARES:
+            time.sleep(0.05)
         for name, data in honest_requests().items():
             expected[name] = service.send(data).body
         quiet, _, quiet_ms, _ = measured(service, "quiet", options.seconds / 6, 2, expected, wrong)
