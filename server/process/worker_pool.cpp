@@ -73,18 +73,12 @@ WorkerPool::~WorkerPool()
     }
     changed_.notify_all();
     if (supervisor_.joinable()) supervisor_.join();
+    // What they have is gone with them: to let drivers and compilers tidy up would only take time.
+    for (const auto& worker : workers_)
+        if (worker->process > 0) kill(worker->process, SIGKILL);
     for (const auto& worker : workers_) {
-        if (worker->process <= 0) continue;
-        worker->channel = Channel(); // an idle one ends when its channel does
-        if (worker->state != State::idle) kill(worker->process, SIGKILL);
-    }
-    const auto patience = Clock::now() + std::chrono::seconds(2);
-    for (const auto& worker : workers_) {
-        if (worker->process <= 0) continue;
         int status = 0;
-        while (waitpid(worker->process, &status, WNOHANG) == 0) {
-            if (Clock::now() >= patience) kill(worker->process, SIGKILL);
-            ::poll(nullptr, 0, 5);
+        while (worker->process > 0 && waitpid(worker->process, &status, 0) < 0 && errno == EINTR) {
         }
     }
     std::error_code ignored; // there is nobody to tell
@@ -113,16 +107,23 @@ void WorkerPool::wait_until_warm(std::size_t workers)
     if (failure_) std::rethrow_exception(failure_);
 }
 
-// Starts the builder, then dead workers, one after another.
+// Starts the builder, then dead workers, two at a time: a start is the work of one processor, for a second or so.
 void WorkerPool::supervise()
 {
+    build();
+    std::thread second([this] { start_the_dead(); });
+    start_the_dead();
+    second.join();
+}
+
+void WorkerPool::start_the_dead()
+{
     constexpr std::chrono::milliseconds look{100}; // for those that died idle
-    const bool built = build();
     std::unique_lock lock(mutex_);
     while (!ending_) {
         bury_the_dead();
         Clock::time_point when = Clock::time_point::max();
-        Worker* const worker = built && !failure_ && !over() ? next_dead(when) : nullptr;
+        Worker* const worker = !failure_ && !over() ? next_dead(when) : nullptr;
         if (!worker) {
             changed_.wait_until(lock, std::min(when, Clock::now() + look));
             continue;
@@ -144,16 +145,20 @@ void WorkerPool::supervise()
 }
 
 // A process of its own, which ends before anybody asks for anything. It alone may write to the folder of kernels that all share.
-bool WorkerPool::build()
+void WorkerPool::build()
 {
     Worker builder;
     builder.number = options_.workers;
     const std::exception_ptr failure = bring_up(builder, true);
+    builder.channel = Channel(); // it ends when its channel does, and what it has to say of the kernels is said
+    for (const auto end = Clock::now() + std::chrono::seconds(5); !failure && Clock::now() < end && ::poll(nullptr, 0, 5) == 0;) {
+        siginfo_t ended{};
+        if (waitid(P_PID, static_cast<id_t>(builder.process), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid != 0) break;
+    }
     const std::scoped_lock lock(mutex_);
     if (failure) failure_ = failure;
     bury(builder, failure ? End::crashed : End::retired);
     changed_.notify_all();
-    return !failure;
 }
 
 // With the mutex: whether more are free than are missing.

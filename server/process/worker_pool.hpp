@@ -113,7 +113,8 @@ private:
     enum class End { crashed, overdue, retired };
     bool over() const; // with the mutex: nobody computes any more
     void supervise();
-    bool build();
+    void build();
+    void start_the_dead();
     std::exception_ptr bring_up(Worker& worker, bool builder);
     void await(Worker& worker, Message& message, bool& lowered);
     bool has_time() const;
