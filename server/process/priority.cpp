@@ -9,6 +9,7 @@
 #include <thread>
 
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 namespace penumbra::server {
@@ -34,6 +35,14 @@ bool lower_priority(pid_t process, int steps)
         if (gone) return false;
     }
     return all;
+}
+
+std::chrono::nanoseconds processor_time(pid_t process)
+{
+    clockid_t clock{};
+    timespec used{};
+    if (process <= 0 || clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &used) != 0) return {};
+    return (std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec)) / std::max(std::thread::hardware_concurrency(), 1U);
 }
 
 bool may_raise_priority()

@@ -343,6 +343,7 @@ void WorkerPool::Lease::give_back()
 Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, const std::function<bool()>& is_long)
 {
     const auto begun = Clock::now();
+    const auto used_before = processor_time(worker_->process);
     auto step = steps_down.begin();
     bool said = !is_long;
     for (;;) {
@@ -353,14 +354,18 @@ Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, 
             end = std::min(end, pool_->end_);
         }
         if (now >= end) return Channel::Got::late;
-        if (step != steps_down.end() && now - begun >= step->after) {
-            lower_priority(worker_->process, step++->steps);
-            lowered_ = true;
+        end = std::min(end, now + std::chrono::milliseconds(100)); // the service's end is looked for now and then: it shortens the wait
+        if (step != steps_down.end()) {
+            const auto left = step->after - (processor_time(worker_->process) - used_before);
+            if (left <= left.zero()) {
+                lower_priority(worker_->process, step++->steps);
+                lowered_ = true;
+            } else {
+                end = std::min(end, now + std::max<Clock::duration>(left, std::chrono::milliseconds(10)));
+            }
         }
         if (!said && now - begun >= long_call) said = is_long();
-        // The service's end is looked for now and then: it shortens the wait.
-        end = std::min(end, now + std::chrono::milliseconds(100));
-        if (step != steps_down.end()) end = std::min(end, begun + step->after);
+        if (!said) end = std::min(end, std::max(begun + long_call, now + std::chrono::milliseconds(10)));
         const auto got = worker_->channel.receive(answer, end);
         if (got != Channel::Got::late) return got;
     }

@@ -36,14 +36,15 @@ struct PoolOptions {
 };
 constexpr int worker_channel = 3;
 
-// From when on a worker that still computes gives way to the others: the lower, the longer.
+// From what use of the processors on a worker gives way to the others: the lower, the more. By the clock, who waits for others would be lowered
+// for it.
 struct Step {
-    std::chrono::milliseconds after;
-    int steps; // of nice(2)
+    std::chrono::milliseconds after; // of all processors together
+    int steps;                       // of nice(2)
 };
 constexpr std::array<Step, 4> steps_down{{{std::chrono::milliseconds(125), 3}, {std::chrono::milliseconds(250), 6}, {std::chrono::milliseconds(500), 10},
-                                           {std::chrono::milliseconds(1000), 14}}};
-constexpr std::chrono::milliseconds long_call{250}; // and then it does so beside the slots, if it may
+                                           {std::chrono::milliseconds(1000), 12}}};
+constexpr std::chrono::milliseconds long_call{250}; // by the clock: then it goes on beside the slots, if it may
 
 class WorkerPool {
 public:
