@@ -77,8 +77,8 @@ private:
     Gate::Slot enter_slot();
     // Has a worker do it. `digest` names the request where it ends its worker.
     template <class Digest>
-    CallReply computed(Gate::Slot& slot, const Call& call, std::span<const int> files, Message& message, const Digest& digest);
-    void send_mask(Response& response, CallReply answer, const Message& message, const MaskFormat& format);
+    CallReply computed(Gate::Slot& slot, const Call& call, std::span<const int> files, const Digest& digest);
+    void send_mask(Response& response, CallReply answer, const MaskFormat& format);
     std::string describe(const KeptUpload& scene);
 
     // service_routes.cpp

@@ -61,7 +61,7 @@ Call call_from(std::string_view text)
 
 std::string text_of(const CallReply& answer)
 {
-    Json json{{"spent", answer.spent}};
+    Json json{{"spent", answer.spent}, {"bytes", answer.bytes}};
     if (answer.problem) {
         const Problem& p = *answer.problem;
         json["problem"] = {{"status", p.status},
@@ -90,6 +90,7 @@ CallReply reply_from(std::string_view text)
     const Json json = Json::parse(text);
     CallReply answer;
     answer.spent = json.at("spent");
+    answer.bytes = json.at("bytes");
     if (json.contains("problem")) {
         const Json& p = json.at("problem");
         answer.problem.emplace(p.at("status").get<int>(), p.at("reason"), p.at("detail"), p.at("retry").get<int>());

@@ -38,8 +38,9 @@ struct SceneFacts {
     std::vector<std::string> warnings = {};
 };
 
-// The file beside it: the bytes of the mask, or of the depth view.
+// At the begin of the file beside it: `bytes` of the mask, or of the depth view.
 struct CallReply {
+    std::uint64_t bytes = 0;
     std::optional<Problem> problem = {};
     std::string inside = {}; // of the problem, for the log alone
     MaskReply reply = {};    // its bytes are the file's

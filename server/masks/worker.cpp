@@ -69,7 +69,7 @@ public:
     std::uint64_t kept_bytes() { return scenes_.counts().bytes; }
 
     // `bytes`: what goes beside the answer.
-    CallReply answer(const Call& call, std::vector<Descriptor> files, Descriptor& bytes)
+    CallReply answer(const Call& call, std::vector<Descriptor> files, std::string& bytes)
     {
         const auto left = std::chrono::duration_cast<Deadline::Clock::duration>(std::chrono::duration<double>(call.seconds));
         const std::chrono::seconds limit(options_.deadline_s);
@@ -88,7 +88,7 @@ public:
 
 private:
     // Once more without the scenes that are kept decoded, if memory was short: the service has what they are made from.
-    CallReply with_room(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    CallReply with_room(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, std::string& bytes)
     {
         try {
             return done(call, shared, deadline, bytes);
@@ -99,7 +99,7 @@ private:
         return done(call, shared, deadline, bytes);
     }
 
-    CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, std::string& bytes)
     {
         switch (call.kind) {
         case Call::Kind::warm:
@@ -124,16 +124,16 @@ private:
         return parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
     }
 
-    CallReply computed(const Call& call, const MaskTask& task, const Deadline& deadline, Deadline::Clock::time_point decoding, Descriptor& bytes)
+    CallReply computed(const Call& call, const MaskTask& task, const Deadline& deadline, Deadline::Clock::time_point decoding, std::string& bytes)
     {
         CallReply answer;
         answer.decode_ms = milliseconds_since(decoding);
         answer.reply = compute_mask(engine_, task, format_named(call.format), options_, deadline);
-        bytes = shared_copy(answer.reply.bytes);
+        bytes = std::move(answer.reply.bytes);
         return answer;
     }
 
-    CallReply mask(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    CallReply mask(const Call& call, std::string_view body, const Deadline& deadline, std::string& bytes)
     {
         const auto decoding = Deadline::Clock::now();
         const auto parts = parts_of(body, call.form);
@@ -141,11 +141,11 @@ private:
         return computed(call, task, deadline, decoding, bytes);
     }
 
-    CallReply depth(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    CallReply depth(const Call& call, std::string_view body, const Deadline& deadline, std::string& bytes)
     {
         const Scene scene = decode_scene(parts_of(body, call.form), options_, deadline);
         const std::vector<std::byte> image = encode_image(depth_view(scene.receivers, call.side), {.format = "pfm", .bits = 32});
-        bytes = shared_copy({reinterpret_cast<const char*>(image.data()), image.size()});
+        bytes.assign(reinterpret_cast<const char*>(image.data()), image.size());
         CallReply answer;
         answer.reply.warnings = scene.warnings;
         answer.width = scene.receivers.width;
@@ -177,7 +177,7 @@ private:
         return answer;
     }
 
-    CallReply kept(const Call& call, std::string_view body, std::string_view change, const Deadline& deadline, Descriptor& bytes)
+    CallReply kept(const Call& call, std::string_view body, std::string_view change, const Deadline& deadline, std::string& bytes)
     {
         const auto decoding = Deadline::Clock::now();
         auto scene = scenes_.find(call.id, true);
@@ -273,19 +273,26 @@ int work(const Options& options, Kernels kernels, const std::string& temporary, 
     if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
 
     Worker worker(options, *engine, temporary);
+    Outbox outbox;
     std::optional<Retention> retention; // from the first call on, which warms it
     for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
         if (message.text.starts_with("forget")) {
             worker.forget(std::string_view(message.text).substr(6));
             continue;
         }
-        Descriptor bytes;
-        CallReply answer =
-            guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
+        std::string bytes;
+        int file = -1;
+        CallReply answer = guarded(
+            [&] {
+                CallReply done = worker.answer(call_from(message.text), std::move(message.files), bytes);
+                done.bytes = bytes.size();
+                if (!bytes.empty()) file = outbox.put(bytes);
+                return done;
+            },
+            greeting.memory);
         if (!retention) retention.emplace(greeting.memory);
         answer.spent = retention->too_much(worker.kept_bytes());
-        const int file = bytes.get();
-        if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
+        if (!channel.send(text_of(answer), std::span(&file, file >= 0 ? 1 : 0))) break;
     }
     return 0;
 }
