@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -147,7 +149,15 @@ int run(const std::vector<std::string>& arguments)
         return 0;
     }
     const Environment environment = [](const char* name) -> const char* { return std::getenv(name); };
-    // Not for users: how the service starts its workers.
+    // Not for users: what a service that has ended leaves behind. Of the folders that WorkerPool makes.
+    if (constexpr std::string_view remove = "--remove="; !arguments.empty() && arguments.front().starts_with(remove)) {
+        const std::filesystem::path folder = arguments.front().substr(remove.size());
+        std::error_code ignored; // there is nobody to tell
+        if (folder.filename().string().starts_with("penumbra-server-") && folder.parent_path() == std::filesystem::temp_directory_path(ignored))
+            std::filesystem::remove_all(folder, ignored);
+        return 0;
+    }
+    // Nor this: how the service starts its workers.
     for (const auto& [flag, kernels] : {std::pair(std::string_view("--worker="), Kernels::own), {"--builder=", Kernels::shared}}) {
         if (arguments.empty() || !arguments.front().starts_with(flag)) continue;
         fcntl(worker_channel, F_SETFD, FD_CLOEXEC);

@@ -81,8 +81,17 @@ WorkerPool::~WorkerPool()
         while (worker->process > 0 && waitpid(worker->process, &status, 0) < 0 && errno == EINTR) {
         }
     }
+    // A thousand files take longer than the end may: by a process that stays for that.
+    if (!folder_.empty()) remove_later();
+}
+
+void WorkerPool::remove_later() const
+{
+    std::string program = options_.program, word = "--remove=" + folder_;
+    const std::array<char*, 3> words{program.data(), word.data(), nullptr};
+    pid_t process = 0;
     std::error_code ignored; // there is nobody to tell
-    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+    if (posix_spawn(&process, options_.program.c_str(), nullptr, nullptr, words.data(), environ) != 0) std::filesystem::remove_all(folder_, ignored);
 }
 
 std::string WorkerPool::folder_of(const Worker& worker) const
@@ -122,6 +131,12 @@ void WorkerPool::start_the_dead()
     std::unique_lock lock(mutex_);
     while (!ending_) {
         bury_the_dead();
+        for (const std::string& folder : std::exchange(left_, {})) {
+            lock.unlock();
+            std::error_code ignored; // it goes with all of them
+            std::filesystem::remove_all(folder, ignored);
+            lock.lock();
+        }
         Clock::time_point when = Clock::time_point::max();
         Worker* const worker = !failure_ && !over() ? next_dead(when) : nullptr;
         if (!worker) {
@@ -267,7 +282,10 @@ void WorkerPool::bury(Worker& worker, End end)
         }
     }
     std::error_code ignored;
-    if (!folder_.empty()) std::filesystem::remove_all(folder_of(worker), ignored); // what it has left there
+    if (!folder_.empty()) { // what it has left there is removed while nobody waits
+        left_.push_back(folder_ + "/left-" + std::to_string(++counts_.buried));
+        std::filesystem::rename(folder_of(worker), left_.back(), ignored);
+    }
     worker.process = 0;
     worker.channel = Channel();
     worker.keeps.clear();

@@ -103,7 +103,7 @@ public:
 
     struct Counts {
         std::size_t starting = 0, idle = 0, busy = 0;
-        std::uint64_t started = 0, crashed = 0, overdue = 0; // so far; overdue: ended at a deadline
+        std::uint64_t started = 0, crashed = 0, overdue = 0, buried = 0; // so far; overdue: ended at a deadline; buried: all that ended
         Clock::duration since_finished{};                    // the last call
     };
     Counts counts() const;
@@ -125,6 +125,7 @@ private:
     Worker* next_dead(Clock::time_point& when);
     void say_death(const Worker& worker, int status) const;
     std::string folder_of(const Worker& worker) const;
+    void remove_later() const;
 
     const PoolOptions options_;
     const Say say_;
@@ -132,6 +133,7 @@ private:
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Worker>> workers_;
+    std::vector<std::string> left_; // folders of workers that ended
     std::string greeting_; // of the builder, once it has come
     std::exception_ptr failure_; // of the first processes: there will be no worker
     std::size_t warmed_ = 0;

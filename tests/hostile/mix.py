@@ -97,9 +97,7 @@ class Hostile:
     def send_loops(self, chance):
         while not self.over.wait(0.5):
             # No two alike: what happened to be under way in two killed workers would be refused from then on.
-            scene = bombs.quads({"kind": "ray_traced", "samples": 65536}, 64, chance.choice((64, 128, 1024)))
-            scene["light"] = {**bombs.LIGHT, "center": [0, chance.uniform(5, 7), 0]}
-            self.send(post("/v1/masks", form(scene)))
+            self.send(post("/v1/masks", form(*bombs.endless(chance.choice((64, 128, 512)), chance.uniform(-1000, 1000)))))
 
     def send_broken(self, chance):
         while not self.over.wait(0.02):
