@@ -5,10 +5,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -19,6 +22,7 @@
 #include "http/service.hpp"
 #include "masks/worker.hpp"
 #include "process/descriptors.hpp"
+#include "process/memory.hpp"
 #include "process/notify.hpp"
 #include "process/options.hpp"
 
@@ -56,7 +60,7 @@ std::string workers_text(const Options& options, const Greeting& greeting)
 {
     std::string closed;
     for (const std::string& what : greeting.closed) closed += (closed.empty() ? "" : ", ") + what;
-    return "workers: " + std::to_string(options.slots) + ", each with " + std::to_string(greeting.memory >> 20) + " MiB; closed to them: " +
+    return "workers: " + std::to_string(options.slots) + " and " + std::to_string(spare_workers(options)) + " to spare, each with " + std::to_string(greeting.memory >> 20) + " MiB; closed to them: " +
            (closed.empty() ? "nothing, as this kernel offers no way" : closed) + "\n";
 }
 
@@ -145,12 +149,20 @@ int run(const std::vector<std::string>& arguments)
         return 0;
     }
     const Environment environment = [](const char* name) -> const char* { return std::getenv(name); };
-    // Not for users: how the service starts its workers.
-    constexpr std::string_view worker = "--worker=";
-    if (!arguments.empty() && arguments.front().starts_with(worker)) {
+    // Not for users: what a service that has ended leaves behind. Of the folders that WorkerPool makes.
+    if (constexpr std::string_view remove = "--remove="; !arguments.empty() && arguments.front().starts_with(remove)) {
+        const std::filesystem::path folder = arguments.front().substr(remove.size());
+        std::error_code ignored; // there is nobody to tell
+        if (folder.filename().string().starts_with("penumbra-server-") && folder.parent_path() == std::filesystem::temp_directory_path(ignored))
+            std::filesystem::remove_all(folder, ignored);
+        return 0;
+    }
+    // Nor this: how the service starts its workers.
+    for (const auto& [flag, kernels] : {std::pair(std::string_view("--worker="), Kernels::own), {"--builder=", Kernels::shared}}) {
+        if (arguments.empty() || !arguments.front().starts_with(flag)) continue;
         fcntl(worker_channel, F_SETFD, FD_CLOEXEC);
-        return work(options_from({arguments.begin() + 1, arguments.end()}, [](const char*) -> const char* { return nullptr; }),
-                    arguments.front().substr(worker.size()), Channel(Descriptor(worker_channel)));
+        return work(options_from({arguments.begin() + 1, arguments.end()}, [](const char*) -> const char* { return nullptr; }), kernels,
+                    arguments.front().substr(flag.size()), Channel(Descriptor(worker_channel)));
     }
     return serve(options_from(arguments, environment), environment);
 }

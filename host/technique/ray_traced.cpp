@@ -1,7 +1,9 @@
 #include "technique/ray_traced.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <vector>
 
 #include <penumbra/error.hpp>
 
@@ -13,6 +15,8 @@ namespace {
 
 constexpr WorkKind rays{"technique.samples", WorkAmount::Unit::rays, "rays"};
 
+bool is_there(float depth) { return depth > 0 && std::isfinite(depth); }
+
 // Rays for the bound do not end at what blocks them.
 int rays_a_sample(bool bound) { return bound ? 2 : 1; }
 
@@ -21,6 +25,31 @@ double samples_of_all(const RayTraced& settings)
 {
     if (!settings.adaptive) return settings.samples;
     return std::sqrt(static_cast<double>(settings.first_samples) * (settings.first_samples + settings.samples));
+}
+
+// So few take some seconds of one core at the most, and are not worth a sample.
+constexpr double few_rays = 0x1p26;
+
+// What all rays will take, as a few to receivers spread over the mask do: by how many things a ray comes past differs a thousandfold.
+double seconds_of_all(const PreparedRays& prepared, const Receiving& receivers, double all_receivers, bool bounds)
+{
+    constexpr int most_receivers = 1024, most_samples = 64;
+    const DepthMap& depth = *receivers.depth;
+    DepthMap some{.width = depth.width, .height = depth.height, .depth = std::vector<float>(depth.depth.size(), nothing_there)};
+    double chosen = 0;
+    for (const int number : spread_numbers(depth.width, depth.height, static_cast<int>(std::min<std::size_t>(depth.depth.size(), most_receivers)))) {
+        const auto at = static_cast<std::size_t>(number);
+        if (!is_there(depth.depth[at]) || is_there(some.depth[at])) continue; // numbers of a small map come twice
+        some.depth[at] = depth.depth[at];
+        ++chosen;
+    }
+    if (chosen == 0) return 0;
+    const int samples = std::min(prepared.settings.samples, most_samples);
+    const auto start = std::chrono::steady_clock::now();
+    trace_visibility(*prepared.casters, prepared.light, some, receivers.camera, {.samples = samples},
+                     {.images = prepared.images, .surface = receivers.surface, .bounds = bounds});
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return seconds * all_receivers / chosen * samples_of_all(prepared.settings) / samples;
 }
 
 } // namespace
@@ -69,8 +98,10 @@ void shade(opencl::Work& work, const PreparedRays& prepared, const Receiving& re
 {
     work.stage("shade");
     if (shaded.estimated) {
-        const auto there = std::ranges::count_if(receivers.depth->depth, [](float depth) { return depth > 0 && std::isfinite(depth); });
-        shaded.estimated(rays.of(static_cast<double>(there) * samples_of_all(prepared.settings) * rays_a_sample(shaded.bound != nullptr)));
+        const auto there = static_cast<double>(std::ranges::count_if(receivers.depth->depth, is_there));
+        const bool bound = shaded.bound != nullptr;
+        const double all = there * samples_of_all(prepared.settings) * rays_a_sample(bound);
+        shaded.estimated(rays.of(all, all > few_rays ? seconds_of_all(prepared, receivers, there, bound) : 0));
     }
     const ChosenReceivers* chosen = receivers.chosen;
     VisibilityResult result = trace_visibility(*prepared.casters, prepared.light, chosen ? chosen->depth : *receivers.depth, receivers.camera,

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <penumbra/error.hpp>
 
@@ -262,12 +264,27 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     const std::size_t lanes = static_cast<std::size_t>(work.context().quirks().lanes);
     const SmoothieGrid grid_of_texels{.lanes = static_cast<int>(lanes), .columns = static_cast<int>((width + lanes - 1) / lanes), .rows = static_cast<int>((height + SmoothieGrid::item_rows - 1) / SmoothieGrid::item_rows)};
     const auto evaluated = work.buffer<cl_uint>(grid_of_texels.items(), "evaluated edges");
-    if (wanted && wanted->estimated)
-        wanted->estimated(estimate_smoothie(view, grid_of_texels, {work.read(prepared.boxes), work.read(prepared.edge_boxes)}, work.read(depths_of.nearest), work.read(depths_of.furthest)));
-    work.launch(prepared.program, "smoothie_buffer", {static_cast<std::size_t>(grid_of_texels.columns), static_cast<std::size_t>(grid_of_texels.rows)},
-                {lanes == 1 ? std::size_t{16} : std::size_t{1}, 1}, count * 24 + prepared.edges.bytes(), view, prepared.boxes,
-                prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, fin_distances, depths,
-                distances, inner_depths, evaluated, work.stop());
+    const auto search = [&](std::size_t rows) {
+        work.launch(prepared.program, "smoothie_buffer", {static_cast<std::size_t>(grid_of_texels.columns), rows},
+                    {lanes == 1 ? std::size_t{16} : std::size_t{1}, 1}, count * 24 + prepared.edges.bytes(), view, prepared.boxes,
+                    prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, fin_distances, depths,
+                    distances, inner_depths, evaluated, work.stop());
+    };
+    const auto all_rows = static_cast<std::size_t>(grid_of_texels.rows);
+    if (wanted && wanted->estimated) {
+        WorkAmount estimate = estimate_smoothie(view, grid_of_texels, {work.read(prepared.boxes), work.read(prepared.edge_boxes)}, work.read(depths_of.nearest), work.read(depths_of.furthest));
+        if (estimate.amount > few_smoothie_pairs)
+            estimate.seconds = estimate.amount / smoothie_rate(all_rows, [&](std::size_t rows) {
+                                   const auto start = std::chrono::steady_clock::now();
+                                   search(rows);
+                                   const std::vector<cl_uint> edges = work.read(evaluated); // waits for the device
+                                   const auto done = edges.begin() + static_cast<std::ptrdiff_t>(rows) * grid_of_texels.columns;
+                                   return SmoothieSample{.pairs = std::accumulate(edges.begin(), done, 0.0) * grid_of_texels.item_texels(),
+                                                         .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+                               });
+        wanted->estimated(estimate);
+    }
+    search(all_rows);
     const std::array<std::size_t, 2> grid{static_cast<std::size_t>(receivers.view.width), static_cast<std::size_t>(receivers.view.height)};
     work.launch(prepared.program, "smoothie_composite", grid, {16, 8}, grid[0] * grid[1] * 16, receivers.view, prepared.occluders, view,
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),

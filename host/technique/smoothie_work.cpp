@@ -51,6 +51,17 @@ std::size_t edges_met(const SmoothieView& view, const SmoothieBoxes& boxes, cons
 
 } // namespace
 
+double smoothie_rate(std::size_t all_rows, const std::function<SmoothieSample(std::size_t rows)>& search)
+{
+    constexpr double enough_seconds = 0.02;
+    for (std::size_t rows = 1;; rows *= 2) {
+        const SmoothieSample sample = search(std::min(rows, all_rows));
+        // The first launch loads the kernel.
+        if (rows > 1 && sample.pairs > 0 && sample.seconds >= enough_seconds) return sample.pairs / sample.seconds;
+        if (rows >= all_rows) return sample.pairs > 0 ? sample.pairs / sample.seconds : HUGE_VAL;
+    }
+}
+
 WorkAmount estimate_smoothie(const SmoothieView& view, const SmoothieGrid& grid, const SmoothieBoxes& boxes, const std::vector<cl_int>& nearest,
                              const std::vector<cl_int>& furthest)
 {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "technique/work_estimate.hpp"
@@ -22,6 +23,15 @@ struct SmoothieGrid {
 struct SmoothieBoxes {
     std::vector<float> groups, edges;
 };
+
+// So few take some seconds at the most, and are not worth a sample.
+constexpr double few_smoothie_pairs = 0x1p33;
+
+struct SmoothieSample {
+    double pairs, seconds;
+};
+// Pairs a second, of search(rows): the first rows of work-items, as many as take a few milliseconds. Infinite where they met no edge.
+double smoothie_rate(std::size_t all_rows, const std::function<SmoothieSample(std::size_t rows)>& search);
 
 // `nearest`, `furthest`: of the receivers of each texel, as bits.
 WorkAmount estimate_smoothie(const SmoothieView& view, const SmoothieGrid& grid, const SmoothieBoxes& boxes, const std::vector<cl_int>& nearest,

@@ -134,9 +134,15 @@ void Tracer::Impl::drop_degenerate()
 
 void Tracer::Impl::build()
 {
-    const std::string config = "threads=" + std::to_string(thread_count());
+    // A cache of tessellated surfaces, of which there are none here, is 128 MiB by default; where they are not to be had, Embree 3.13 hangs in the
+    // next device.
+    const std::string config = "tessellation_cache_size=0,threads=" + std::to_string(thread_count());
     device = rtcNewDevice(config.c_str());
-    if (!device) throw Error(ErrorCode::internal, "Embree: rtcNewDevice failed with error " + std::to_string(rtcGetDeviceError(nullptr)));
+    if (!device) {
+        const RTCError why = rtcGetDeviceError(nullptr);
+        throw Error(why == RTC_ERROR_OUT_OF_MEMORY ? ErrorCode::too_large : ErrorCode::internal,
+                    "Embree: rtcNewDevice failed with error " + std::to_string(why));
+    }
     rtcSetDeviceErrorFunction(
         device,
         [](void* self, RTCError code, const char* text) {

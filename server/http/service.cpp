@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <random>
 
 #include <sys/socket.h>
@@ -11,6 +12,8 @@
 
 #include "http/connection.hpp"
 #include "http/service_http.hpp"
+#include "masks/worker.hpp"
+#include "process/kernel_copies.hpp"
 #include "process/memory.hpp"
 
 namespace penumbra::server {
@@ -46,15 +49,40 @@ std::string random_prefix()
     return text;
 }
 
-PoolOptions pool_of(const Options& options, std::string program)
+void check_warm(const Message& message)
 {
-    return {.program = std::move(program), .arguments = arguments_of(options), .workers = static_cast<std::size_t>(options.slots)};
+    const CallReply answer = reply_from(message.text);
+    if (answer.problem) throw Error(ErrorCode::device, answer.inside.empty() ? answer.problem->detail : answer.inside);
 }
 
-Greeting greeting_of(WorkerPool& pool)
+// Whether there is a place where each worker may have copies of kernels.
+bool has_place_for_kernels()
 {
-    Greeting greeting = greeting_from(pool.start().text);
+    std::error_code none;
+    const auto folder = std::filesystem::temp_directory_path(none);
+    return !none && may_hold_code(folder);
+}
+
+PoolOptions pool_of(const Options& options, std::string program, bool own_kernels)
+{
+    PoolOptions pool{.program = std::move(program),
+                     .arguments = arguments_of(options),
+                     .workers = static_cast<std::size_t>(options.slots) + spare_workers(options),
+                     .warm = text_of(Call{.kind = Call::Kind::warm, .seconds = 3600}),
+                     .warmed = check_warm};
+    if (own_kernels)
+        pool.furnish = [since = std::filesystem::file_time_type::clock::now() - std::chrono::seconds(1)](const std::string& folder, const std::string& greeting) {
+            // A file system's clock is behind by a tick.
+            if (!folder.empty()) copy_kernels(shared_folders(greeting_from(greeting).kernels), since, folders_in(own_cache(folder)));
+        };
+    return pool;
+}
+
+Greeting greeting_of(WorkerPool& pool, bool own_kernels)
+{
+    Greeting greeting = greeting_from(pool.start());
     if (!greeting.problem.empty()) throw Error(static_cast<ErrorCode>(greeting.code), greeting.problem);
+    if (own_kernels) greeting.closed.emplace_back("kernels that others load (copies)");
     return greeting;
 }
 
@@ -135,8 +163,9 @@ void Service::Http::begin(httplib::Request& request, Connection& connection)
 
 Service::Service(Options options, Log log, std::string program)
     : options_(std::move(options)), log_(std::move(log)),
-      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue)),
-      pool_(pool_of(options_, std::move(program)), log_), greeting_(greeting_of(pool_)),
+      gate_(static_cast<std::size_t>(options_.slots), static_cast<std::size_t>(options_.queue), spare_workers(options_)),
+      own_kernels_(has_place_for_kernels()), pool_(pool_of(options_, std::move(program), own_kernels_), log_),
+      greeting_(greeting_of(pool_, own_kernels_)),
       device_(greeting_.device + "\n" + greeting_.driver), uploads_(uploads_memory(options_)),
       scenes_(static_cast<std::uint64_t>(options_.scenes_bytes), static_cast<std::size_t>(options_.scenes),
               std::chrono::seconds(options_.scenes_s)),
@@ -162,13 +191,7 @@ int Service::bind()
 
 void Service::become_ready()
 {
-    // One after another: the first builds the kernels that are missing, the others find them.
-    const Deadline patient(std::chrono::hours(1));
-    for (std::size_t i = 0; i < static_cast<std::size_t>(options_.slots); ++i) {
-        auto worker = pool_.lease_number(i, patient);
-        const CallReply answer = reply_from(worker.call(text_of(Call{.kind = Call::Kind::warm, .seconds = 3600}), {}, patient).text);
-        if (answer.problem) throw Error(ErrorCode::device, answer.inside.empty() ? answer.problem->detail : answer.inside);
-    }
+    pool_.wait_until_warm(static_cast<std::size_t>(options_.slots));
     warm_ = true;
 }
 

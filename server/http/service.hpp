@@ -31,13 +31,13 @@ struct Route;
 class Service {
 public:
     using Log = std::function<void(std::string_view line)>; // called from many threads
-    // Starts the first worker, a process of `program` (penumbra-server; by default this one). Throws what keeps it from its work: no device.
+    // Starts the first processes, of `program` (penumbra-server; by default this one). Throws what keeps it from its work: no device.
     Service(Options options, Log log, std::string program = "/proc/self/exe");
     ~Service();
 
     // Binds; gives the port. Throws usage when the address cannot be had.
     int bind();
-    // Has each worker check the device and launch every technique; then /readyz says ready. Throws Problem.
+    // Waits until a worker for each slot has checked the device and launched every technique; then /readyz says ready. Throws Problem.
     void become_ready();
     // Answers until stop(); returns when what was in flight is done or stopped.
     void serve();
@@ -74,10 +74,11 @@ private:
     void post_kept_mask(const Request& request, Response& response);
     void get_scene(const Request& request, Response& response);
     void delete_scene(const Request& request, Response& response);
-    Gate::Guard enter_slot();
+    Gate::Slot enter_slot();
     // Has a worker do it. `digest` names the request where it ends its worker.
-    template <class Digest> CallReply computed(const Call& call, std::span<const int> files, Message& message, const Digest& digest);
-    void send_mask(Response& response, CallReply answer, const Message& message, const MaskFormat& format);
+    template <class Digest>
+    CallReply computed(Gate::Slot& slot, const Call& call, std::span<const int> files, const Digest& digest);
+    void send_mask(Response& response, CallReply answer, const MaskFormat& format);
     std::string describe(const KeptUpload& scene);
 
     // service_routes.cpp
@@ -90,6 +91,7 @@ private:
     const Options options_;
     const Log log_;
     Gate gate_;
+    const bool own_kernels_; // of each worker
     WorkerPool pool_;
     const Greeting greeting_;
     const std::string device_; // and its driver, as masks depend on them

@@ -28,6 +28,9 @@ std::string_view id_in(const httplib::Request& request)
     return std::string_view(request.path).substr(before, 64);
 }
 
+// Four floats a pixel, and what files have beside: no worker makes more, whoever it obeys.
+std::uint64_t largest_answer(const Options& options) { return static_cast<std::uint64_t>(options.receivers) * 16 + (std::uint64_t{1} << 20); }
+
 // The entity tag of a mask, made beside what else is to be done: SHA-256 takes a millisecond or more for the two megabytes of a pair of
 // maps. Waits for its end when it goes.
 class Tag {
@@ -99,26 +102,28 @@ SharedBytes Service::read_body(const Request& request)
     return body;
 }
 
-Gate::Guard Service::enter_slot()
+Gate::Slot Service::enter_slot()
 {
     const auto waiting = Deadline::Clock::now();
-    Gate::Guard slot = gate_.enter(Connection::current().request());
+    Gate::Slot slot = gate_.enter(Connection::current().request());
     const double wait_s = seconds_since(waiting);
     Connection::current().cost.queue_ms = wait_s * 1000;
     metrics_.observe("penumbra_queue_wait_seconds", "", wait_s);
     return slot;
 }
 
-template <class Digest> CallReply Service::computed(const Call& call, std::span<const int> files, Message& message, const Digest& digest)
+template <class Digest>
+CallReply Service::computed(Gate::Slot& slot, const Call& call, std::span<const int> files, const Digest& digest)
 {
     const Deadline& deadline = Connection::current().request();
     if (crashes_.any()) crashes_.check(digest());
     const auto calling = Deadline::Clock::now();
     auto worker = pool_.lease(call.id, deadline);
     Call timed = call;
+    Message message;
     timed.seconds = std::max(std::chrono::duration<double>(deadline.end() - Deadline::Clock::now()).count(), 0.0);
     try {
-        message = worker.call(text_of(timed), files, deadline);
+        message = worker.call(text_of(timed), files, deadline, [&] { return slot.step_aside(); });
     } catch (const Problem& problem) {
         if (problem.reason == "crashed") {
             const std::string name = digest();
@@ -130,6 +135,10 @@ template <class Digest> CallReply Service::computed(const Call& call, std::span<
     if (!call.id.empty()) worker.keeps(call.id);
     if (crashes_.any()) crashes_.absolve(digest());
     CallReply answer = reply_from(message.text);
+    // Before the worker is given back, which then uses the file again.
+    if (answer.bytes > largest_answer(options_)) throw Error(ErrorCode::internal, "a worker's answer of " + std::to_string(answer.bytes) + " bytes");
+    if (!message.files.empty()) answer.reply.bytes = copy_of(message.files.front(), answer.bytes);
+    if (answer.spent) worker.retire();
     Connection::current().cost.worker_ms = seconds_since(calling) * 1000;
     if (!answer.problem) return answer;
     Connection::current().inside = answer.inside;
@@ -149,11 +158,10 @@ void Service::post_mask(const Request& request, Response& response)
     const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{body.descriptor()};
-    Message message;
     const Call call{.kind = Call::Kind::mask, .form = form, .choice = choice, .format = std::string(format.format)};
-    send_mask(response, computed(call, files, message, content), message, format);
+    send_mask(response, computed(slot, call, files, content), format);
     tag.set_on(response);
 }
 
@@ -168,10 +176,9 @@ void Service::post_scene(const Request& request, Response& response)
     auto scene = scenes_.find(id, true);
     response.status = scene ? 200 : 201;
     if (!scene) {
-        const auto slot = enter_slot();
+        auto slot = enter_slot();
         const std::array files{body.descriptor()};
-        Message message;
-        const CallReply answer = computed({.kind = Call::Kind::keep, .form = form, .id = id}, files, message, [&] { return id; });
+        const CallReply answer = computed(slot, {.kind = Call::Kind::keep, .form = form, .id = id}, files, [&] { return id; });
         connection.cost.decode_ms = answer.decode_ms;
         scene = std::make_shared<KeptUpload>(id, std::move(body), form, answer.scene.value(), [this, id] { pool_.forget(id); });
         scenes_.keep(scene);
@@ -189,15 +196,14 @@ void Service::post_depth(const Request& request, Response& response)
     const std::string form = boundary_of(connection.content_type);
     const auto parts = parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{body.descriptor()};
-    Message message;
-    const CallReply answer = computed({.kind = Call::Kind::depth, .form = form, .side = side}, files, message, [&] { return id_of(parts); });
-    if (message.files.empty()) throw Error(ErrorCode::internal, "a worker's answer without its depth");
+    CallReply answer = computed(slot, {.kind = Call::Kind::depth, .form = form, .side = side}, files, [&] { return id_of(parts); });
+    if (answer.reply.bytes.empty()) throw Error(ErrorCode::internal, "a worker's answer without its depth");
     response.status = 200;
     response.set_header("Penumbra-Size", std::to_string(answer.width) + "x" + std::to_string(answer.height));
     if (!answer.reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(answer.reply.warnings));
-    response.body = copy_of(message.files.front());
+    response.body = std::move(answer.reply.bytes);
     response.set_header("Content-Type", "image/x-portable-floatmap");
 }
 
@@ -223,27 +229,26 @@ void Service::post_kept_mask(const Request& request, Response& response)
     const Tag tag(body.size(), [&] { return etag_of(device_, content(), choice, format); });
     if (tag.is_known(request, response)) return;
 
-    const auto slot = enter_slot();
+    auto slot = enter_slot();
     const std::array files{scene->body().descriptor(), body.descriptor()};
-    Message message;
     const Call call{.kind = Call::Kind::kept,
                     .form = scene->form(),
                     .id = scene->id(),
                     .patch_form = form,
                     .choice = choice,
                     .format = std::string(format.format)};
-    CallReply answer = computed(call, files, message, content);
+    CallReply answer = computed(slot, call, files, content);
     if (answer.scene) scene->set_size(*answer.scene);
-    send_mask(response, std::move(answer), message, format);
+    send_mask(response, std::move(answer), format);
     tag.set_on(response);
     scenes_.tidy();
 }
 
-void Service::send_mask(Response& response, CallReply answer, const Message& message, const MaskFormat& format)
+void Service::send_mask(Response& response, CallReply answer, const MaskFormat& format)
 {
     RequestCost& cost = Connection::current().cost;
     MaskReply& reply = answer.reply;
-    if (message.files.empty()) throw Error(ErrorCode::internal, "a worker's answer without its mask");
+    if (reply.bytes.empty()) throw Error(ErrorCode::internal, "a worker's answer without its mask");
     cost.decode_ms = answer.decode_ms;
     cost.technique = reply.technique;
     cost.compute_ms = reply.compute_ms;
@@ -260,9 +265,7 @@ void Service::send_mask(Response& response, CallReply answer, const Message& mes
     response.status = 200;
     response.set_header("Server-Timing", server_timing(reply.stages));
     if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
-    const auto copying = Deadline::Clock::now();
-    response.body = copy_of(message.files.front());
-    cost.worker_ms += seconds_since(copying) * 1000;
+    response.body = std::move(reply.bytes);
     response.set_header("Content-Type", std::string(format.media_type));
 }
 

@@ -61,7 +61,7 @@ Call call_from(std::string_view text)
 
 std::string text_of(const CallReply& answer)
 {
-    Json json;
+    Json json{{"spent", answer.spent}, {"bytes", answer.bytes}};
     if (answer.problem) {
         const Problem& p = *answer.problem;
         json["problem"] = {{"status", p.status},
@@ -89,6 +89,8 @@ CallReply reply_from(std::string_view text)
 {
     const Json json = Json::parse(text);
     CallReply answer;
+    answer.spent = json.at("spent");
+    answer.bytes = json.at("bytes");
     if (json.contains("problem")) {
         const Json& p = json.at("problem");
         answer.problem.emplace(p.at("status").get<int>(), p.at("reason"), p.at("detail"), p.at("retry").get<int>());
@@ -125,7 +127,8 @@ std::string text_of(const Greeting& greeting)
                         {"devices", greeting.devices_json},
                         {"warnings", cut(greeting.warnings)},
                         {"closed", greeting.closed},
-                        {"memory", greeting.memory}});
+                        {"memory", greeting.memory},
+                        {"kernels", greeting.kernels}});
 }
 
 Greeting greeting_from(std::string_view text)
@@ -138,7 +141,8 @@ Greeting greeting_from(std::string_view text)
             .devices_json = json.at("devices"),
             .warnings = json.at("warnings"),
             .closed = json.at("closed"),
-            .memory = json.at("memory")};
+            .memory = json.at("memory"),
+            .kernels = json.at("kernels")};
 }
 
 } // namespace penumbra::server

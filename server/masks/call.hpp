@@ -38,14 +38,16 @@ struct SceneFacts {
     std::vector<std::string> warnings = {};
 };
 
-// The file beside it: the bytes of the mask, or of the depth view.
+// At the begin of the file beside it: `bytes` of the mask, or of the depth view.
 struct CallReply {
+    std::uint64_t bytes = 0;
     std::optional<Problem> problem = {};
     std::string inside = {}; // of the problem, for the log alone
     MaskReply reply = {};    // its bytes are the file's
     double decode_ms = 0;
     std::optional<SceneFacts> scene = {};
     int width = 0, height = 0; // of the receivers, with a depth view
+    bool spent = false;        // the worker holds on to much memory: another one should take its place
 };
 
 // Who a worker is: its first message.
@@ -56,6 +58,7 @@ struct Greeting {
     std::vector<std::string> warnings = {};
     std::vector<std::string> closed = {}; // what the kernel keeps from it
     std::uint64_t memory = 0;             // bytes that it may take
+    std::string kernels = {};             // the folder where PoCL keeps its own
 };
 
 // Texts are cut where they would be longer than a message.

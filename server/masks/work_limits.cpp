@@ -31,7 +31,7 @@ void check_amount(std::string_view where, double amount, std::string_view what, 
 }
 
 // So few are some seconds of one core at the most, and not worth a sample.
-constexpr std::int64_t few_pairs = std::int64_t{1} << 33;
+constexpr std::int64_t few_pairs = std::int64_t{1} << 33, few_rays = std::int64_t{1} << 26;
 
 // A sample tells the time within a factor of some two: what is over the time left by this much does not end within it.
 constexpr double surely = 4;
@@ -89,11 +89,16 @@ std::function<void(const WorkAmount&)> estimate_check(const MaskTask& task, cons
 {
     const double least = static_cast<double>(std::min(options.pairs, few_pairs));
     const std::vector<WorkAmount> most = work_of(task.job);
-    if (std::ranges::none_of(most, [&](const WorkAmount& work) { return work.unit == WorkAmount::Unit::pairs && work.amount > least; })) return {};
+    const auto may_take_long = [&](const WorkAmount& work) {
+        return (work.unit == WorkAmount::Unit::pairs && work.amount > least) ||
+               (work.unit == WorkAmount::Unit::rays && work.amount > static_cast<double>(few_rays));
+    };
+    if (std::ranges::none_of(most, may_take_long)) return {};
     return [&options, &deadline, pairs = 0.0](const WorkAmount& work) mutable {
-        if (work.unit != WorkAmount::Unit::pairs) return;
-        pairs += work.amount;
-        check_amount(work.key, pairs, work.what, options.pairs);
+        if (work.unit == WorkAmount::Unit::pairs) {
+            pairs += work.amount;
+            check_amount(work.key, pairs, work.what, options.pairs);
+        }
         check_time(work, deadline);
     };
 }

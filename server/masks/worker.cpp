@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 #include <optional>
+#include <system_error>
 #include <thread>
 
 #include <sys/prctl.h>
@@ -23,6 +25,7 @@
 #include "masks/work_limits.hpp"
 #include "process/confinement.hpp"
 #include "process/memory.hpp"
+#include "process/own_memory.hpp"
 #include "process/ready.hpp"
 #include "process/shared_bytes.hpp"
 #include "process/watch.hpp"
@@ -37,21 +40,36 @@ const MaskFormat& format_named(std::string_view format)
     return mask_formats().front();
 }
 
+// Libraries load what they need when the first image of a format comes: some 100 MiB, of a request's share. Rather now.
+void warm_formats(const std::string& temporary)
+{
+    if (temporary.empty()) return;
+    const Image image{.width = 16, .height = 16, .channels = 1, .pixels = std::vector<float>(256, 0.5F)};
+    for (const MaskFormat& format : mask_formats()) {
+        const std::string path = temporary + "/warm." + std::string(format.format);
+        write_image(path, image, {.format = std::string(format.format)});
+        if (read_image(path).pixels.size() != image.pixels.size()) throw Error(ErrorCode::internal, std::string(format.format) + ": an image came back otherwise");
+        std::filesystem::remove(path);
+    }
+}
+
 double milliseconds_since(Deadline::Clock::time_point begin) { return seconds_since(begin) * 1000; }
 
 class Worker {
 public:
-    Worker(const Options& options, const Engine& engine)
-        : options_(options), engine_(engine),
-          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes / options.slots), worker_memory(options) / 4),
+    Worker(const Options& options, const Engine& engine, std::string temporary)
+        : options_(options), engine_(engine), temporary_(std::move(temporary)),
+          scenes_(std::min(static_cast<std::uint64_t>(options.scenes_bytes) / (static_cast<std::uint64_t>(options.slots) + spare_workers(options)),
+                           worker_memory(options) / 4),
                   static_cast<std::size_t>(options.scenes), std::chrono::seconds(options.scenes_s))
     {
     }
 
     void forget(std::string_view id) { scenes_.forget(id); }
+    std::uint64_t kept_bytes() { return scenes_.counts().bytes; }
 
     // `bytes`: what goes beside the answer.
-    CallReply answer(const Call& call, std::vector<Descriptor> files, Descriptor& bytes)
+    CallReply answer(const Call& call, std::vector<Descriptor> files, std::string& bytes)
     {
         const auto left = std::chrono::duration_cast<Deadline::Clock::duration>(std::chrono::duration<double>(call.seconds));
         const std::chrono::seconds limit(options_.deadline_s);
@@ -70,7 +88,7 @@ public:
 
 private:
     // Once more without the scenes that are kept decoded, if memory was short: the service has what they are made from.
-    CallReply with_room(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    CallReply with_room(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, std::string& bytes)
     {
         try {
             return done(call, shared, deadline, bytes);
@@ -81,12 +99,13 @@ private:
         return done(call, shared, deadline, bytes);
     }
 
-    CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, Descriptor& bytes)
+    CallReply done(const Call& call, const std::vector<SharedBytes>& shared, const Deadline& deadline, std::string& bytes)
     {
         switch (call.kind) {
         case Call::Kind::warm:
             check_known_mask(engine_);
             warm(engine_);
+            warm_formats(temporary_);
             return {};
         case Call::Kind::mask:
             return mask(call, shared[0], deadline, bytes);
@@ -105,16 +124,16 @@ private:
         return parse_multipart(body, form, static_cast<std::size_t>(options_.parts));
     }
 
-    CallReply computed(const Call& call, const MaskTask& task, const Deadline& deadline, Deadline::Clock::time_point decoding, Descriptor& bytes)
+    CallReply computed(const Call& call, const MaskTask& task, const Deadline& deadline, Deadline::Clock::time_point decoding, std::string& bytes)
     {
         CallReply answer;
         answer.decode_ms = milliseconds_since(decoding);
         answer.reply = compute_mask(engine_, task, format_named(call.format), options_, deadline);
-        bytes = shared_copy(answer.reply.bytes);
+        bytes = std::move(answer.reply.bytes);
         return answer;
     }
 
-    CallReply mask(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    CallReply mask(const Call& call, std::string_view body, const Deadline& deadline, std::string& bytes)
     {
         const auto decoding = Deadline::Clock::now();
         const auto parts = parts_of(body, call.form);
@@ -122,11 +141,11 @@ private:
         return computed(call, task, deadline, decoding, bytes);
     }
 
-    CallReply depth(const Call& call, std::string_view body, const Deadline& deadline, Descriptor& bytes)
+    CallReply depth(const Call& call, std::string_view body, const Deadline& deadline, std::string& bytes)
     {
         const Scene scene = decode_scene(parts_of(body, call.form), options_, deadline);
         const std::vector<std::byte> image = encode_image(depth_view(scene.receivers, call.side), {.format = "pfm", .bits = 32});
-        bytes = shared_copy({reinterpret_cast<const char*>(image.data()), image.size()});
+        bytes.assign(reinterpret_cast<const char*>(image.data()), image.size());
         CallReply answer;
         answer.reply.warnings = scene.warnings;
         answer.width = scene.receivers.width;
@@ -158,7 +177,7 @@ private:
         return answer;
     }
 
-    CallReply kept(const Call& call, std::string_view body, std::string_view change, const Deadline& deadline, Descriptor& bytes)
+    CallReply kept(const Call& call, std::string_view body, std::string_view change, const Deadline& deadline, std::string& bytes)
     {
         const auto decoding = Deadline::Clock::now();
         auto scene = scenes_.find(call.id, true);
@@ -182,6 +201,7 @@ private:
 
     const Options& options_;
     const Engine& engine_;
+    const std::string temporary_; // folder
     Watch watch_;
     SceneStore scenes_;
 };
@@ -207,17 +227,22 @@ template <class Call> CallReply guarded(const Call& call, std::uint64_t memory)
 }
 
 // What strangers' bytes must not reach is closed before any comes.
-Greeting greet(const Options& options, const std::string& temporary, std::optional<Engine>& engine)
+Greeting greet(const Options& options, bool own_kernels, const std::string& temporary, std::optional<Engine>& engine)
 {
     Greeting greeting;
     if (leave_network()) greeting.closed.emplace_back("the network (a namespace)");
     prctl(PR_SET_PDEATHSIG, SIGKILL); // after what changes rights, which takes it back
     greeting.memory = worker_memory(options);
     limit_memory(greeting.memory);
+    if (own_kernels) {
+        setenv("PENUMBRA_CACHE_DIR", own_cache(temporary).c_str(), 1);
+        unsetenv("POCL_CACHE_DIR");
+    }
     prepare_environment();
-    // After the folder of kernels was chosen, which all workers share.
+    if (const char* const folder = std::getenv("POCL_CACHE_DIR")) greeting.kernels = folder; // as was just chosen
+    // After the folder of kernels was chosen.
     if (!temporary.empty()) setenv("TMPDIR", temporary.c_str(), 1);
-    if (close_files(folders_of_a_worker(temporary))) greeting.closed.emplace_back("files (Landlock)");
+    if (close_files(folders_of_a_worker(temporary, !own_kernels))) greeting.closed.emplace_back("files (Landlock)");
     if (close_calls()) greeting.closed.emplace_back("sockets and system calls (seccomp)");
     engine.emplace(options.device.empty() ? Engine() : Engine(options.device));
     const DeviceInfo device = engine->device();
@@ -230,29 +255,44 @@ Greeting greet(const Options& options, const std::string& temporary, std::option
 
 } // namespace
 
-int work(const Options& options, const std::string& temporary, Channel channel)
+std::string own_cache(const std::string& temporary) { return temporary + "/cache"; }
+
+int work(const Options& options, Kernels kernels, const std::string& temporary, Channel channel)
 {
+    std::error_code unknown;
+    const bool own_kernels = kernels == Kernels::own && std::filesystem::is_directory(own_cache(temporary), unknown);
+    give_back_large_blocks();
     std::optional<Engine> engine;
     Greeting greeting;
     try {
-        greeting = greet(options, temporary, engine);
+        greeting = greet(options, own_kernels, temporary, engine);
     } catch (const Error& error) {
         greeting.problem = error.what();
         greeting.code = static_cast<int>(error.code());
     }
     if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
 
-    Worker worker(options, *engine);
+    Worker worker(options, *engine, temporary);
+    Outbox outbox;
+    std::optional<Retention> retention; // from the first call on, which warms it
     for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
         if (message.text.starts_with("forget")) {
             worker.forget(std::string_view(message.text).substr(6));
             continue;
         }
-        Descriptor bytes;
-        const CallReply answer =
-            guarded([&] { return worker.answer(call_from(message.text), std::move(message.files), bytes); }, greeting.memory);
-        const int file = bytes.get();
-        if (!channel.send(text_of(answer), std::span(&file, bytes ? 1 : 0))) break;
+        std::string bytes;
+        int file = -1;
+        CallReply answer = guarded(
+            [&] {
+                CallReply done = worker.answer(call_from(message.text), std::move(message.files), bytes);
+                done.bytes = bytes.size();
+                if (!bytes.empty()) file = outbox.put(bytes);
+                return done;
+            },
+            greeting.memory);
+        if (!retention) retention.emplace(greeting.memory);
+        answer.spent = retention->too_much(worker.kept_bytes());
+        if (!channel.send(text_of(answer), std::span(&file, file >= 0 ? 1 : 0))) break;
     }
     return 0;
 }

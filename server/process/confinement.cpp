@@ -20,7 +20,6 @@
 #include <sched.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -112,7 +111,7 @@ bool leave_network()
     return true;
 }
 
-OpenFolders folders_of_a_worker(const std::string& temporary)
+OpenFolders folders_of_a_worker(const std::string& temporary, bool with_kernels)
 {
     OpenFolders folders{.read = {"/usr", "/lib", "/lib32", "/lib64", "/bin", "/etc", "/opt", "/proc", "/sys"}, .write = {}};
     if (!temporary.empty()) folders.write.push_back(temporary);
@@ -132,10 +131,12 @@ OpenFolders folders_of_a_worker(const std::string& temporary)
     const auto kernels = [&](const std::string& folder, const char* below) {
         if (!folder.empty()) folders.write.push_back(folder + below);
     };
-    kernels(value_of("PENUMBRA_CACHE_DIR"), "");
-    kernels(value_of("XDG_CACHE_HOME"), "/penumbra");
-    kernels(value_of("HOME"), "/.cache/penumbra");
-    kernels(value_of("POCL_CACHE_DIR"), "");
+    if (with_kernels) {
+        kernels(value_of("PENUMBRA_CACHE_DIR"), "");
+        kernels(value_of("XDG_CACHE_HOME"), "/penumbra");
+        kernels(value_of("HOME"), "/.cache/penumbra");
+        kernels(value_of("POCL_CACHE_DIR"), "");
+    }
     if (const std::string note = value_of("PENUMBRA_PROGRAM_LOG"); !note.empty())
         folders.write.push_back(std::filesystem::path(note).parent_path().string());
     return folders;
@@ -163,7 +164,9 @@ bool close_calls()
                                 SYS_request_key, SYS_keyctl, SYS_userfaultfd, SYS_setns, SYS_unshare,
                                 // Queues of calls, sockets among them, that this filter does not see; other processes.
                                 SYS_io_uring_setup, SYS_io_uring_enter, SYS_io_uring_register, SYS_pidfd_getfd, SYS_pidfd_send_signal,
-                                SYS_process_madvise, SYS_tkill, SYS_rt_sigqueueinfo, SYS_rt_tgsigqueueinfo, SYS_setpriority};
+                                SYS_process_madvise, SYS_tkill, SYS_rt_sigqueueinfo, SYS_rt_tgsigqueueinfo, SYS_setpriority,
+                                // A pair of sockets is closed as well: one of datagrams can be connected anew, to any local socket.
+                                SYS_socket, SYS_socketpair, SYS_connect, SYS_bind, SYS_listen, SYS_accept, SYS_accept4};
     std::vector<sock_filter> program{step(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)),
                                      step(BPF_JMP | BPF_JEQ | BPF_K, this_machine, 1, 0),
                                      step(BPF_RET | BPF_K, refused),
@@ -177,9 +180,8 @@ bool close_calls()
         program.push_back(step(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 1));
         program.push_back(step(BPF_RET | BPF_K, refused));
     }
-    // Sockets of its own machine only; signals to itself (as abort(3) sends); limits of its own (0: the caller's).
+    // Signals to itself (as abort(3) sends); limits of its own (0: the caller's).
     const auto self = static_cast<std::uint32_t>(getpid());
-    allow_with(program, SYS_socket, 0, {AF_UNIX});
     allow_with(program, SYS_kill, 0, {self});
     allow_with(program, SYS_tgkill, 0, {self});
     allow_with(program, SYS_prlimit64, 0, {0, self});

@@ -15,15 +15,15 @@ struct OpenFolders {
     std::vector<std::string> read; // and execute: libraries, the linker, devices' own files
     std::vector<std::string> write;
 };
-// The loader's folders, those of devices and of this program, and as `write` the folder of temporary files and that of kernels.
-OpenFolders folders_of_a_worker(const std::string& temporary);
+// The loader's folders, those of devices and of this program, and as `write` the folder of temporary files; `kernels`: and those of built kernels.
+OpenFolders folders_of_a_worker(const std::string& temporary, bool kernels);
 
 // Closes the file system but for those folders (Landlock), for this thread and those that it makes. False: the kernel has no Landlock
 // that lets files be moved within them (Linux 5.19).
 bool close_files(const OpenFolders& folders);
 
-// Refuses sockets but those of this machine's processes, signals to others, tracing them, mounting and loading modules (seccomp), for this
-// process and those that it starts. False: the kernel has no filters.
+// Refuses sockets, signals to other processes, tracing them, mounting and loading modules (seccomp), for this process and those that it starts.
+// What it has open stays so. False: the kernel has no filters.
 bool close_calls();
 
 // Memory beyond what the process has now, in bytes: what is private and can be written (RLIMIT_DATA). Throws Error device where it cannot be set.

@@ -28,10 +28,10 @@ Gate::Guard Gate::admit()
     const std::scoped_lock lock(mutex_);
     if (admitted_ >= places_) throw Problem(503, "queue_full", "all " + std::to_string(places_) + " places are taken; try again", 1);
     ++admitted_;
-    return {*this, &Gate::leave_house};
+    return Guard(*this);
 }
 
-Gate::Guard Gate::enter(const Deadline& deadline)
+Gate::Slot Gate::enter(const Deadline& deadline)
 {
     std::unique_lock lock(mutex_);
     const auto self = waiting_.insert(waiting_.end(), 0);
@@ -45,13 +45,13 @@ Gate::Guard Gate::enter(const Deadline& deadline)
         throw Problem(504, "deadline", "no compute slot was free in time", 1);
     }
     ++computing_;
-    return {*this, &Gate::leave_slot};
+    return Slot(*this);
 }
 
 Gate::Counts Gate::counts() const
 {
     const std::scoped_lock lock(mutex_);
-    return {admitted_, waiting_.size(), computing_};
+    return {admitted_, waiting_.size(), computing_ + beside_};
 }
 
 void Gate::leave_house()
@@ -60,13 +60,25 @@ void Gate::leave_house()
     --admitted_;
 }
 
-void Gate::leave_slot()
+void Gate::leave_slot(bool beside)
 {
     {
         const std::scoped_lock lock(mutex_);
+        --(beside ? beside_ : computing_);
+    }
+    turn_.notify_all();
+}
+
+bool Gate::step_aside()
+{
+    {
+        const std::scoped_lock lock(mutex_);
+        if (beside_ >= spares_) return false;
+        ++beside_;
         --computing_;
     }
     turn_.notify_all();
+    return true;
 }
 
 } // namespace penumbra::server

@@ -36,44 +36,62 @@ inline double seconds_since(Deadline::Clock::time_point begin)
     return std::chrono::duration<double>(Deadline::Clock::now() - begin).count();
 }
 
-// `slots` requests compute; `queue` more may upload or wait, first come first served. Safe to use from several threads at once.
+// `slots` requests compute; `queue` more may upload or wait, first come first served. What takes long may go on beside them, up to `spares`
+// requests. Safe to use from several threads at once.
 class Gate {
 public:
-    Gate(std::size_t slots, std::size_t queue) : slots_(slots), places_(slots + queue) {}
+    Gate(std::size_t slots, std::size_t queue, std::size_t spares = 0) : slots_(slots), places_(slots + queue), spares_(spares) {}
 
     // Leaves when it goes out of scope.
     class Guard {
     public:
-        Guard(Gate& gate, void (Gate::*leave)()) : gate_(&gate), leave_(leave) {}
-        Guard(Guard&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)), leave_(other.leave_) {}
+        explicit Guard(Gate& gate) : gate_(&gate) {}
+        Guard(Guard&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)) {}
         Guard& operator=(Guard&&) = delete;
         ~Guard()
         {
-            if (gate_) (gate_->*leave_)();
+            if (gate_) gate_->leave_house();
         }
 
     private:
         Gate* gate_;
-        void (Gate::*leave_)();
+    };
+    // The same, of a request that computes.
+    class Slot {
+    public:
+        explicit Slot(Gate& gate) : gate_(&gate) {}
+        Slot(Slot&& other) noexcept : gate_(std::exchange(other.gate_, nullptr)), beside_(other.beside_) {}
+        Slot& operator=(Slot&&) = delete;
+        ~Slot()
+        {
+            if (gate_) gate_->leave_slot(beside_);
+        }
+        // Goes on beside the slots, so that the next one may compute. False while as many as may do so already do.
+        bool step_aside() { return beside_ = beside_ || gate_->step_aside(); }
+
+    private:
+        Gate* gate_;
+        bool beside_ = false;
     };
 
     bool full() const;
-    [[nodiscard]] Guard admit();                         // a place in the house; throws Problem 503 when there is none
-    [[nodiscard]] Guard enter(const Deadline& deadline); // a slot; waits; throws Problem 504 when the deadline passes first
+    [[nodiscard]] Guard admit();                        // a place in the house; throws Problem 503 when there is none
+    [[nodiscard]] Slot enter(const Deadline& deadline); // waits; throws Problem 504 when the deadline passes first
 
     struct Counts {
-        std::size_t admitted, waiting, computing;
+        std::size_t admitted, waiting, computing; // computing: those beside the slots too
     };
     Counts counts() const;
 
 private:
     void leave_house();
-    void leave_slot();
+    void leave_slot(bool beside);
+    bool step_aside();
 
-    const std::size_t slots_, places_;
+    const std::size_t slots_, places_, spares_;
     mutable std::mutex mutex_;
     std::condition_variable turn_;
-    std::size_t admitted_ = 0, computing_ = 0;
+    std::size_t admitted_ = 0, computing_ = 0, beside_ = 0; // computing: in the slots
     std::list<int> waiting_; // in order of arrival; an entry's address tells whose it is
 };
 

@@ -9,7 +9,9 @@ namespace penumbra::server {
 
 // The smaller of --memory, the control group's limit and the machine's memory, in bytes.
 std::uint64_t memory_limit(const Options& options);
-// Three quarters of that are the workers', in even shares.
+// How many workers are kept warm beside those of the slots: as many as asked for, fewer where all shares would be too small for common requests.
+std::size_t spare_workers(const Options& options);
+// Three quarters of the limit are the workers', in even shares.
 std::uint64_t worker_memory(const Options& options);
 // The last quarter is the service's own: bodies with the scenes that are kept, answers that wait for their clients, and its code.
 std::uint64_t uploads_memory(const Options& options);

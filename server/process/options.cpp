@@ -79,6 +79,12 @@ const std::array rows{
               {0, std::int64_t{1} << 50},
               &Options::memory},
     OptionRow{"slots", "requests", "requests that are decoded, computed and encoded at the same time", {1, 256}, &Options::slots},
+    OptionRow{"spares",
+              "workers",
+              "workers kept warm beside those of the slots: one takes the place of a worker that died, or of one that is busy for longer than a "
+              "quarter of a second, which goes on at low priority. Fewer where memory is short",
+              {0, 256},
+              &Options::spares},
     OptionRow{
         "queue", "requests", "further requests that may be uploading or waiting; more are refused with 503", {0, 1024}, &Options::queue},
     OptionRow{"io-threads", "threads", "connections served at the same time; at least slots + queue + 4", {5, 2048}, &Options::io_threads},

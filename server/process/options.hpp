@@ -37,6 +37,7 @@ struct Options {
     // Limits of the service.
     std::int64_t memory = 0;
     std::int64_t slots = 2;
+    std::int64_t spares = 1;
     std::int64_t queue = 16;
     std::int64_t io_threads = 32;
     std::int64_t connections = 512;

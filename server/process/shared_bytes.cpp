@@ -1,5 +1,6 @@
 #include "process/shared_bytes.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <new>
 #include <utility>
@@ -61,21 +62,23 @@ SharedBytes::~SharedBytes()
     if (bytes_) munmap(bytes_, size_);
 }
 
-Descriptor shared_copy(std::string_view bytes)
+int Outbox::put(std::string_view bytes)
 {
-    Descriptor file = new_file();
-    while (!bytes.empty()) {
-        const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
+    constexpr std::size_t most = 4 << 20; // that is kept between two
+    if (!file_ || size_ > most) file_ = new_file(), size_ = 0;
+    for (std::size_t done = 0; done < bytes.size();) {
+        const ssize_t written = ::pwrite(file_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
         if (written < 0 && errno == EINTR) continue;
         if (written <= 0) throw std::bad_alloc();
-        bytes.remove_prefix(static_cast<std::size_t>(written));
+        done += static_cast<std::size_t>(written);
+        size_ = std::max(size_, done);
     }
-    return file;
+    return file_.get();
 }
 
-std::string copy_of(const Descriptor& file)
+std::string copy_of(const Descriptor& file, std::size_t size)
 {
-    std::string bytes(size_of(file), '\0');
+    std::string bytes(std::min(size, size_of(file)), '\0');
     std::size_t done = 0;
     while (done < bytes.size()) {
         const ssize_t got = ::pread(file.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));

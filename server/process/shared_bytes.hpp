@@ -33,9 +33,20 @@ private:
     std::size_t size_ = 0;
 };
 
-// Bytes for another process; an invalid descriptor for none. Throws std::bad_alloc.
-Descriptor shared_copy(std::string_view bytes);
-// All of what another process made. Reads, and does not map: a file that shrinks meanwhile ends the copy, not this process.
-std::string copy_of(const Descriptor& file);
+// What goes to another process, one after another: the file stays, and with it its memory, which the system need not find and clear for each.
+// The other side has copied one before the next is put.
+class Outbox {
+public:
+    // Gives the file that holds the bytes at its begin, for as long as this lives or until the next ones. Throws std::bad_alloc.
+    int put(std::string_view bytes);
+
+private:
+    Descriptor file_;
+    std::size_t size_ = 0; // that it has had
+};
+
+// The first `size` bytes of what another process made, or what there is of them. Reads, and does not map: a file that shrinks meanwhile ends the
+// copy, not this process.
+std::string copy_of(const Descriptor& file, std::size_t size);
 
 } // namespace penumbra::server

@@ -16,6 +16,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "process/priority.hpp"
 #include "process/problem.hpp"
 #include "process/wait.hpp"
 
@@ -26,7 +27,6 @@ namespace {
 
 // Between two starts of a worker that dies again and again.
 constexpr std::chrono::milliseconds first_pause{100}, longest_pause{10000};
-constexpr std::chrono::minutes longest_start{10}; // kernels may have to be built
 
 std::string death_of(int status)
 {
@@ -55,7 +55,8 @@ struct WorkerPool::Worker {
     std::chrono::milliseconds pause{0};
 };
 
-WorkerPool::WorkerPool(PoolOptions options, Say say) : options_(std::move(options)), say_(std::move(say)), folder_(new_folder())
+WorkerPool::WorkerPool(PoolOptions options, Say say)
+    : options_(std::move(options)), say_(std::move(say)), folder_(new_folder()), raises_(may_raise_priority())
 {
     for (std::size_t i = 0; i < options_.workers; ++i) {
         workers_.push_back(std::make_unique<Worker>());
@@ -72,22 +73,25 @@ WorkerPool::~WorkerPool()
     }
     changed_.notify_all();
     if (supervisor_.joinable()) supervisor_.join();
+    // What they have is gone with them: to let drivers and compilers tidy up would only take time.
+    for (const auto& worker : workers_)
+        if (worker->process > 0) kill(worker->process, SIGKILL);
     for (const auto& worker : workers_) {
-        if (worker->process <= 0) continue;
-        worker->channel = Channel(); // an idle one ends when its channel does
-        if (worker->state != State::idle) kill(worker->process, SIGKILL);
-    }
-    const auto patience = Clock::now() + std::chrono::seconds(2);
-    for (const auto& worker : workers_) {
-        if (worker->process <= 0) continue;
         int status = 0;
-        while (waitpid(worker->process, &status, WNOHANG) == 0) {
-            if (Clock::now() >= patience) kill(worker->process, SIGKILL);
-            ::poll(nullptr, 0, 5);
+        while (worker->process > 0 && waitpid(worker->process, &status, 0) < 0 && errno == EINTR) {
         }
     }
+    // A thousand files take longer than the end may: by a process that stays for that.
+    if (!folder_.empty()) remove_later();
+}
+
+void WorkerPool::remove_later() const
+{
+    std::string program = options_.program, word = "--remove=" + folder_;
+    const std::array<char*, 3> words{program.data(), word.data(), nullptr};
+    pid_t process = 0;
     std::error_code ignored; // there is nobody to tell
-    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+    if (posix_spawn(&process, options_.program.c_str(), nullptr, nullptr, words.data(), environ) != 0) std::filesystem::remove_all(folder_, ignored);
 }
 
 std::string WorkerPool::folder_of(const Worker& worker) const
@@ -95,54 +99,131 @@ std::string WorkerPool::folder_of(const Worker& worker) const
     return folder_.empty() ? std::string() : folder_ + "/" + std::to_string(worker.number);
 }
 
-Message WorkerPool::start()
+std::string WorkerPool::start()
 {
     std::unique_lock lock(mutex_);
     supervisor_ = std::thread([this] { supervise(); });
-    changed_.wait(lock, [&] { return greeting_ || no_greeting_; });
-    if (no_greeting_) std::rethrow_exception(no_greeting_);
-    return std::move(*greeting_);
+    changed_.wait(lock, [&] { return !greeting_.empty() || failure_; });
+    if (greeting_.empty()) std::rethrow_exception(failure_);
+    return greeting_;
 }
 
-// Starts dead workers, one after another; the first alone until it has said its greeting.
-void WorkerPool::supervise()
+void WorkerPool::wait_until_warm(std::size_t workers)
 {
     std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return warmed_ >= workers || failure_ || over(); });
+    if (over()) throw service_ends();
+    if (failure_) std::rethrow_exception(failure_);
+}
+
+// Starts the builder, then dead workers, two at a time: a start is the work of one processor, for a second or so.
+void WorkerPool::supervise()
+{
+    build();
+    std::thread second([this] { start_the_dead(); });
+    start_the_dead();
+    second.join();
+}
+
+void WorkerPool::start_the_dead()
+{
+    constexpr std::chrono::milliseconds look{100}; // for those that died idle
+    std::unique_lock lock(mutex_);
     while (!ending_) {
+        bury_the_dead();
+        for (const std::string& folder : std::exchange(left_, {})) {
+            lock.unlock();
+            std::error_code ignored; // it goes with all of them
+            std::filesystem::remove_all(folder, ignored);
+            lock.lock();
+        }
         Clock::time_point when = Clock::time_point::max();
-        Worker* const worker = no_greeting_ ? nullptr : next_dead(when);
+        Worker* const worker = !failure_ && !over() ? next_dead(when) : nullptr;
         if (!worker) {
-            if (when == Clock::time_point::max())
-                changed_.wait(lock);
-            else
-                changed_.wait_until(lock, when);
+            changed_.wait_until(lock, std::min(when, Clock::now() + look));
             continue;
         }
         worker->state = State::starting;
         lock.unlock();
-        std::exception_ptr failure;
-        Message greeting;
-        try {
-            spawn(*worker);
-            // The end of the service ends the wait too.
-            for (auto got = Channel::Got::late; got != Channel::Got::message;) {
-                got = worker->channel.receive(greeting, Clock::now() + std::chrono::milliseconds(100));
-                const std::scoped_lock again(mutex_);
-                if (ending_ || got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
-            }
-        } catch (...) {
-            failure = std::current_exception();
-        }
+        const std::exception_ptr failure = bring_up(*worker, false);
         lock.lock();
         if (failure) {
-            bury(*worker, false);
-            if (!greeting_) no_greeting_ = failure;
+            bury(*worker, End::crashed);
+            if (warmed_ == 0) failure_ = failure;
         } else {
             worker->state = State::idle;
             ++counts_.started;
-            if (!greeting_) greeting_ = std::move(greeting);
+            ++warmed_;
         }
         changed_.notify_all();
+    }
+}
+
+// A process of its own, which ends before anybody asks for anything. It alone may write to the folder of kernels that all share.
+void WorkerPool::build()
+{
+    Worker builder;
+    builder.number = options_.workers;
+    const std::exception_ptr failure = bring_up(builder, true);
+    builder.channel = Channel(); // it ends when its channel does, and what it has to say of the kernels is said
+    for (const auto end = Clock::now() + std::chrono::seconds(5); !failure && Clock::now() < end && ::poll(nullptr, 0, 5) == 0;) {
+        siginfo_t ended{};
+        if (waitid(P_PID, static_cast<id_t>(builder.process), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid != 0) break;
+    }
+    const std::scoped_lock lock(mutex_);
+    if (failure) failure_ = failure;
+    bury(builder, failure ? End::crashed : End::retired);
+    changed_.notify_all();
+}
+
+// With the mutex: whether more are free than are missing.
+bool WorkerPool::has_time() const
+{
+    const auto in = [&](auto... states) {
+        return std::ranges::count_if(workers_, [&](const auto& worker) { return ((worker->state == states) || ...); });
+    };
+    return in(State::idle) > in(State::dead, State::starting);
+}
+
+// Waits for a message of one that starts. The end of the service ends the wait too. Where it is not missed it leaves its time to the others.
+void WorkerPool::await(Worker& worker, Message& message, bool& lowered)
+{
+    constexpr int steps = 10; // of nice(2): a ninth of what the others get, where they want all
+    for (;;) {
+        const auto got = worker.channel.receive(message, Clock::now() + std::chrono::milliseconds(50));
+        if (got == Channel::Got::message) return;
+        const std::scoped_lock lock(mutex_);
+        if (over()) throw service_ends();
+        if (got == Channel::Got::ended) throw Problem(503, "no_worker", "a worker ended before it was ready");
+        if (raises_ && has_time() != lowered) {
+            lowered = !lowered;
+            lower_priority(worker.process, lowered ? steps : 0);
+        }
+    }
+}
+
+// Gives what kept it from being ready.
+std::exception_ptr WorkerPool::bring_up(Worker& worker, bool builder)
+{
+    try {
+        bool lowered = false;
+        spawn(worker, builder);
+        Message message;
+        await(worker, message, lowered);
+        if (builder) {
+            const std::scoped_lock lock(mutex_);
+            greeting_ = message.text;
+            changed_.notify_all();
+        }
+        if (!options_.warm.empty()) {
+            if (!worker.channel.send(options_.warm)) throw Problem(503, "no_worker", "a worker ended before it was warm");
+            await(worker, message, lowered);
+            options_.warmed(message);
+        }
+        if (lowered) lower_priority(worker.process, 0);
+        return nullptr;
+    } catch (...) {
+        return std::current_exception();
     }
 }
 
@@ -156,13 +237,14 @@ WorkerPool::Worker* WorkerPool::next_dead(Clock::time_point& when)
     return nullptr;
 }
 
-void WorkerPool::spawn(Worker& worker)
+void WorkerPool::spawn(Worker& worker, bool builder)
 {
     auto [ours, theirs] = Channel::pair();
     const std::string folder = folder_of(worker);
     std::error_code ignored; // a worker without a folder takes no meshes, and says so
     if (!folder.empty()) std::filesystem::create_directory(folder, ignored);
-    std::vector<std::string> words{options_.program, "--worker=" + folder};
+    if (!builder) options_.furnish(folder, greeting_);
+    std::vector<std::string> words{options_.program, (builder ? "--builder=" : "--worker=") + folder};
     words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());
@@ -185,29 +267,32 @@ void WorkerPool::spawn(Worker& worker)
 }
 
 // With the mutex. The process ends, its place is free to be taken again.
-void WorkerPool::bury(Worker& worker, bool overdue)
+void WorkerPool::bury(Worker& worker, End end)
 {
     if (worker.process > 0) {
         kill(worker.process, SIGKILL);
         int status = 0;
         while (waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
         }
-        if (overdue)
+        if (end == End::overdue)
             ++counts_.overdue;
-        else if (!ending_) {
+        else if (end == End::crashed && !over()) {
             ++counts_.crashed;
             say_death(worker, status);
         }
     }
     std::error_code ignored;
-    if (!folder_.empty()) std::filesystem::remove_all(folder_of(worker), ignored); // what it has left there
+    if (!folder_.empty()) { // what it has left there is removed while nobody waits
+        left_.push_back(folder_ + "/left-" + std::to_string(++counts_.buried));
+        std::filesystem::rename(folder_of(worker), left_.back(), ignored);
+    }
     worker.process = 0;
     worker.channel = Channel();
     worker.keeps.clear();
     worker.to_forget.clear();
     worker.state = State::dead;
     // One that served for a while starts again at once.
-    const bool young = worker.used == Clock::time_point::min();
+    const bool young = end == End::crashed && worker.used == Clock::time_point::min();
     worker.pause = young ? std::clamp(worker.pause * 2, first_pause, longest_pause) : std::chrono::milliseconds(0);
     worker.not_before = Clock::now() + worker.pause;
     worker.used = Clock::time_point::min();
@@ -221,7 +306,7 @@ void WorkerPool::bury_the_dead()
         if (worker->state != State::idle) continue;
         pollfd channel{worker->channel.descriptor(), POLLIN, 0};
         if (::poll(&channel, 1, 0) <= 0) continue;
-        bury(*worker, false);
+        bury(*worker, End::crashed);
         changed_.notify_all();
     }
 }
@@ -255,29 +340,57 @@ WorkerPool::Lease WorkerPool::lease(std::string_view name, const Deadline& deadl
     return {*this, *best};
 }
 
-WorkerPool::Lease WorkerPool::lease_number(std::size_t number, const Deadline& deadline)
-{
-    std::unique_lock lock(mutex_);
-    Worker& worker = *workers_.at(number);
-    if (!changed_.wait_until(lock, deadline.end(), [&] { return worker.state == State::idle || over(); }) || over()) {
-        if (over()) throw service_ends();
-        throw Problem(503, "no_worker", "worker " + std::to_string(number) + " did not start in time", 5);
-    }
-    worker.state = State::busy;
-    return {*this, worker};
-}
-
 WorkerPool::Lease::~Lease()
 {
     if (!worker_) return;
-    {
-        const std::scoped_lock lock(pool_->mutex_);
-        if (worker_->state == State::busy) worker_->state = State::idle;
-    }
+    give_back();
     pool_->changed_.notify_all();
 }
 
-Message WorkerPool::Lease::call(std::string_view text, std::span<const int> files, const Deadline& deadline)
+void WorkerPool::Lease::give_back()
+{
+    const std::scoped_lock lock(pool_->mutex_);
+    if (worker_->state != State::busy) return;
+    worker_->state = State::idle;
+    // One whose priority stays low serves nobody well any more.
+    const bool stays_low = lowered_ && !(pool_->raises_ && lower_priority(worker_->process, 0));
+    if (retired_ || stays_low) pool_->bury(*worker_, End::retired);
+}
+
+// Waits for the answer. The longer it takes, the more it leaves to others.
+Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, const std::function<bool()>& is_long)
+{
+    const auto begun = Clock::now();
+    const auto used_before = processor_time(worker_->process);
+    auto step = steps_down.begin();
+    bool said = !is_long;
+    for (;;) {
+        const auto now = Clock::now();
+        Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
+        {
+            const std::scoped_lock lock(pool_->mutex_);
+            end = std::min(end, pool_->end_);
+        }
+        if (now >= end) return Channel::Got::late;
+        end = std::min(end, now + std::chrono::milliseconds(100)); // the service's end is looked for now and then: it shortens the wait
+        if (step != steps_down.end()) {
+            const auto left = step->after - (processor_time(worker_->process) - used_before);
+            if (left <= left.zero()) {
+                lower_priority(worker_->process, step++->steps);
+                lowered_ = true;
+            } else {
+                end = std::min(end, now + std::max<Clock::duration>(left, std::chrono::milliseconds(10)));
+            }
+        }
+        if (!said && now - begun >= long_call) said = is_long();
+        if (!said) end = std::min(end, std::max(begun + long_call, now + std::chrono::milliseconds(10)));
+        const auto got = worker_->channel.receive(answer, end);
+        if (got != Channel::Got::late) return got;
+    }
+}
+
+Message WorkerPool::Lease::call(std::string_view text, std::span<const int> files, const Deadline& deadline,
+                                const std::function<bool()>& is_long)
 {
     Worker& worker = *worker_;
     std::vector<std::string> to_forget;
@@ -290,25 +403,14 @@ Message WorkerPool::Lease::call(std::string_view text, std::span<const int> file
     for (const std::string& name : to_forget) there = there && worker.channel.send("forget" + name);
     there = there && worker.channel.send(text, files);
     Message answer;
-    auto got = there ? Channel::Got::late : Channel::Got::ended;
-    while (got == Channel::Got::late) {
-        const auto now = Clock::now();
-        Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
-        {
-            const std::scoped_lock lock(pool_->mutex_);
-            end = std::min(end, pool_->end_);
-        }
-        if (now >= end) break;
-        // The service's end is looked for now and then: it shortens the wait.
-        got = worker.channel.receive(answer, std::min(end, now + std::chrono::milliseconds(100)));
-    }
+    const auto got = there ? wait(answer, deadline, is_long) : Channel::Got::ended;
     const std::scoped_lock lock(pool_->mutex_);
     if (got == Channel::Got::message) {
         worker.used = pool_->finished_ = Clock::now();
         return answer;
     }
     const bool late = got == Channel::Got::late, ended = Clock::now() >= pool_->end_;
-    pool_->bury(worker, late);
+    pool_->bury(worker, late ? End::overdue : End::crashed);
     pool_->changed_.notify_all();
     if (ended) throw service_ends();
     if (late) throw deadline.over();

@@ -1,6 +1,7 @@
 // The processes that decode, compute and encode: one a slot, of this same program. They may die; the service does not.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -8,7 +9,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -23,12 +23,28 @@
 namespace penumbra::server {
 
 struct PoolOptions {
-    std::string program; // that is started with --worker=FOLDER and `arguments`, and has its channel at descriptor worker_channel
+    // That is started with --worker=FOLDER and `arguments`, and has its channel at descriptor worker_channel. Its first message is its greeting.
+    // The first process of all gets --builder=FOLDER instead.
+    std::string program;
     std::vector<std::string> arguments;
     std::size_t workers = 2;
     std::chrono::milliseconds grace{500}; // beyond a request's deadline, until its worker is ended
+    std::string warm;                     // the first call to each, before it counts as free
+    std::function<void(const Message& answer)> warmed = [](const Message&) {};         // looks at what came back; throws
+    // Fills a worker's folder before it starts; the text is the first process's greeting. Throws.
+    std::function<void(const std::string& folder, const std::string& greeting)> furnish = [](const std::string&, const std::string&) {};
 };
 constexpr int worker_channel = 3;
+
+// From what use of the processors on a worker gives way to the others: the lower, the more. By the clock, who waits for others would be lowered
+// for it.
+struct Step {
+    std::chrono::milliseconds after; // of all processors together
+    int steps;                       // of nice(2)
+};
+constexpr std::array<Step, 4> steps_down{{{std::chrono::milliseconds(125), 3}, {std::chrono::milliseconds(250), 6}, {std::chrono::milliseconds(500), 10},
+                                           {std::chrono::milliseconds(1000), 12}}};
+constexpr std::chrono::milliseconds long_call{250}; // by the clock: then it goes on beside the slots, if it may
 
 class WorkerPool {
 public:
@@ -49,28 +65,37 @@ public:
     class Lease {
     public:
         Lease(WorkerPool& pool, Worker& worker) : pool_(&pool), worker_(&worker) {}
-        Lease(Lease&& other) noexcept : pool_(other.pool_), worker_(std::exchange(other.worker_, nullptr)) {}
+        Lease(Lease&& other) noexcept
+            : pool_(other.pool_), worker_(std::exchange(other.worker_, nullptr)), lowered_(other.lowered_), retired_(other.retired_)
+        {
+        }
         Lease& operator=(Lease&&) = delete;
         ~Lease();
 
-        // Sends the call and waits for its answer. Throws Problem: 504 when the deadline passes, and the worker is ended; 500 `crashed`
-        // when it dies by itself; 503 when the service ends.
-        Message call(std::string_view text, std::span<const int> files, const Deadline& deadline);
+        // Sends the call and waits for its answer. `is_long` is called from long_call on, now and then until it says true. Throws Problem:
+        // 504 when the deadline passes, and the worker is ended; 500 `crashed` when it dies by itself; 503 when the service ends.
+        Message call(std::string_view text, std::span<const int> files, const Deadline& deadline, const std::function<bool()>& is_long = {});
         // That the worker keeps what belongs to this name now, or does no longer.
         void keeps(const std::string& name);
+        // That it is to end when it is given back; another takes its place.
+        void retire() { retired_ = true; }
 
     private:
+        void give_back();
+        Channel::Got wait(Message& answer, const Deadline& deadline, const std::function<bool()>& is_long);
+
         WorkerPool* pool_;
         Worker* worker_;
+        bool lowered_ = false, retired_ = false;
     };
 
-    // Starts the first worker and waits for its greeting, the first message that a worker sends; the others start after it. Throws Problem
-    // with its last words when it dies before.
-    Message start();
+    // Starts a process that builds what is missing, waits for its greeting, and gives that. It ends when it is warm, and the workers start. Throws
+    // Problem when it dies before.
+    std::string start();
+    // Waits until so many workers have been warmed. Throws what kept the first of them from it, and Problem 503 when the service ends.
+    void wait_until_warm(std::size_t workers);
     // A worker that is free, rather one that keeps what belongs to `name`. Waits. Throws Problem 503 when none becomes free in time.
     Lease lease(std::string_view name, const Deadline& deadline);
-    // The worker of that number, from 0.
-    Lease lease_number(std::size_t number, const Deadline& deadline);
     // Workers that keep what belongs to the name are told to forget it, before their next call: the text `forget` and the name.
     void forget(const std::string& name);
     // From now on nobody computes for longer than `time`: then calls end with Problem 503.
@@ -78,7 +103,7 @@ public:
 
     struct Counts {
         std::size_t starting = 0, idle = 0, busy = 0;
-        std::uint64_t started = 0, crashed = 0, overdue = 0; // so far; overdue: ended at a deadline
+        std::uint64_t started = 0, crashed = 0, overdue = 0, buried = 0; // so far; overdue: ended at a deadline; buried: all that ended
         Clock::duration since_finished{};                    // the last call
     };
     Counts counts() const;
@@ -86,14 +111,21 @@ public:
 
 private:
     enum class State { dead, starting, idle, busy };
+    enum class End { crashed, overdue, retired };
     bool over() const; // with the mutex: nobody computes any more
     void supervise();
-    void spawn(Worker& worker);
+    void build();
+    void start_the_dead();
+    std::exception_ptr bring_up(Worker& worker, bool builder);
+    void await(Worker& worker, Message& message, bool& lowered);
+    bool has_time() const;
+    void spawn(Worker& worker, bool builder);
     void bury_the_dead();
-    void bury(Worker& worker, bool overdue);
+    void bury(Worker& worker, End end);
     Worker* next_dead(Clock::time_point& when);
     void say_death(const Worker& worker, int status) const;
     std::string folder_of(const Worker& worker) const;
+    void remove_later() const;
 
     const PoolOptions options_;
     const Say say_;
@@ -101,8 +133,11 @@ private:
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Worker>> workers_;
-    std::optional<Message> greeting_;
-    std::exception_ptr no_greeting_;
+    std::vector<std::string> left_; // folders of workers that ended
+    std::string greeting_; // of the builder, once it has come
+    std::exception_ptr failure_; // of the first processes: there will be no worker
+    std::size_t warmed_ = 0;
+    const bool raises_; // a priority that was lowered
     Counts counts_;
     Clock::time_point finished_ = Clock::now();
     Clock::time_point end_ = Clock::time_point::max();

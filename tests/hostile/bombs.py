@@ -118,3 +118,10 @@ def maps(side, number):
     scene["occluders"] = {"camera": CAMERA, "depth": {"front": "front.pfm"}}
     scene["receivers"] = {"camera": CAMERA, "depth": "floor.pfm"}
     return scene, {"front.pfm": pfm(side, side, 2.0), "floor.pfm": pfm(side, side, 6.0)}
+
+
+def endless(side, number=0):
+    """Rays for minutes; how long they take nobody estimates."""
+    scene, parts = maps(side, number)
+    scene["technique"] = {"kind": "depth_trace", "samples": 16384}
+    return scene, parts

@@ -1,26 +1,31 @@
 """Honest requests among hostile ones: bombs, endless work, broken images, workers that are killed, slow clients.
 
-    mix.py SERVER [--seconds N]
+    mix.py SERVER [--seconds N] [--slow] [--log FILE]
 
 First a quiet time, a sixth of it, then the mix. Honest masks have to keep their bits; only the request that a killed worker had may be lost, and what
 is refused for want of places or memory is asked again. Memory must not rise. Prints a Markdown table. Exit: 0 all held, 1 not.
 
-N: 8, or 600 with PENUMBRA_HOSTILE=long in the environment.
+N: 8, or 600 with PENUMBRA_HOSTILE=long in the environment. --slow names what the slowest honest requests waited for. What is hostile runs in a process of
+its own: clients of one Python process wait for each other.
 """
 
 import argparse
 import collections
+import json
 import os
 import random
 import signal
+import subprocess
 import sys
 import threading
 import time
 
 import bombs
-from service import Service, form, post
+from service import Service, Visitor, form, post
 
-MEMORY = 2000  # MiB
+MEMORY = 4000  # MiB
+SLOTS = 3
+SPARES = 4  # for two loops, a bomb, and a worker that was killed
 
 
 def honest_requests():
@@ -42,7 +47,7 @@ class Honest:
     def __init__(self, service, seed):
         self.service, self.random = service, random.Random(seed)
         self.requests = honest_requests()
-        self.bits, self.times, self.counts, self.wrong = {}, [], collections.Counter(), []
+        self.bits, self.times, self.slow, self.counts, self.wrong = {}, [], [], collections.Counter(), []
 
     def run(self, until, expected=None):
         while time.monotonic() < until():
@@ -50,6 +55,7 @@ class Honest:
             begun = time.monotonic()
             answer = self.service.send(self.requests[name])
             self.times.append(time.monotonic() - begun)
+            self.slow.append((self.times[-1], name, answer.status, answer.headers.get("server-timing", answer.reason)))
             self.counts[f"{answer.status} {answer.reason}".strip()] += 1
             if answer.status == 200:
                 if answer.body != (expected or self.bits).setdefault(name, answer.body):
@@ -66,20 +72,19 @@ class Hostile:
         layer, square = bombs.tiff(4096, 4096), bombs.png(4096, 4096, 30000)
         self.bombs = [post("/v1/masks", form(*scene)) for scene in
                       [bombs.tables(), bombs.layers(layer), bombs.depth_objects(square), bombs.splits(), bombs.channels(20000)]]
-        self.loops = [post("/v1/masks", form(bombs.quads({"kind": "ray_traced", "samples": 65536}, 64, side))) for side in (128, 1024)]
         self.broken = [post("/v1/masks", data) for data in (b"--B--\r\n", b"", form("{"), form(bombs.HONEST)[:-40])]
         self.threads = [threading.Thread(target=run, args=(random.Random(number),)) for number, run in
-                        enumerate([self.send_bombs, self.send_loops, self.send_broken, self.kill, self.be_slow])]
+                        enumerate([self.send_bombs, self.send_loops, self.send_loops, self.send_broken, self.kill, self.be_slow])]
 
-    def __enter__(self):
+    def run(self):
+        """Until standard input ends; then says what came of it."""
         for thread in self.threads:
             thread.start()
-        return self
-
-    def __exit__(self, *_):
+        sys.stdin.read()
         self.over.set()
         for thread in self.threads:
             thread.join()
+        print(json.dumps({"kills": self.kills, "counts": self.counts}))
 
     def send(self, data):
         answer = self.service.send(data)
@@ -91,7 +96,8 @@ class Hostile:
 
     def send_loops(self, chance):
         while not self.over.wait(0.5):
-            self.send(chance.choice(self.loops))
+            # No two alike: what happened to be under way in two killed workers would be refused from then on.
+            self.send(post("/v1/masks", form(*bombs.endless(chance.choice((64, 128, 512)), chance.uniform(-1000, 1000)))))
 
     def send_broken(self, chance):
         while not self.over.wait(0.02):
@@ -118,6 +124,19 @@ class Hostile:
                 held.pop(0).close()
         for connection in held:
             connection.close()
+
+
+class HostileProcess:
+    def __init__(self, service):
+        self.process = subprocess.Popen([sys.executable, "-B", __file__, "--hostile", str(service.port), str(service.pid)], text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        said = json.loads(self.process.communicate()[0])
+        self.kills, self.counts = said["kills"], collections.Counter(said["counts"])
 
 
 def percentile(times, share):
@@ -148,23 +167,27 @@ def measured(service, name, seconds, clients, expected, wrong):
     peak = max(size for _, size in samples)
     print(f"| {name} | {len(times)} | {', '.join(f'{n} times {what}' for what, n in counts.most_common())} | {percentile(times, 0.5):.1f} | "
           f"{percentile(times, 0.99):.1f} | {peak} |", flush=True)
-    return counts, samples
+    return counts, samples, percentile(times, 0.99), sorted((entry for one in honest for entry in one.slow), reverse=True)
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("server")
     arguments.add_argument("--seconds", type=float, default=600 if os.environ.get("PENUMBRA_HOSTILE") == "long" else 8)
+    arguments.add_argument("--slow", action="store_true")
+    arguments.add_argument("--log", help="where the service's standard error goes")
     options = arguments.parse_args()
     wrong, expected = [], {}
     print("| time | honest requests | answers | ms: median | 99 % | MiB, at most |\n| --- | --- | --- | --- | --- | --- |", flush=True)
-    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 15, "--rays", 1 << 40, "--slots", 3) as service:
+    with Service(options.server, "--memory", MEMORY << 20, "--deadline-s", 15, "--rays", 1 << 40, "--slots", SLOTS, "--spares", SPARES) as service:
+        while service.metric('penumbra_workers{state="idle"}') < SLOTS + SPARES:
+            time.sleep(0.05)
         for name, data in honest_requests().items():
             expected[name] = service.send(data).body
-        quiet, _ = measured(service, "quiet", options.seconds / 6, 2, expected, wrong)
-        with Hostile(service) as hostile:
-            mixed, samples = measured(service, "mixed", options.seconds, 2, expected, wrong)
-        after, _ = measured(service, "quiet again", options.seconds / 6, 2, expected, wrong)
+        quiet, _, quiet_ms, _ = measured(service, "quiet", options.seconds / 6, 2, expected, wrong)
+        with HostileProcess(service) as hostile:
+            mixed, samples, mixed_ms, slow = measured(service, "mixed", options.seconds, 2, expected, wrong)
+        after, _, _, _ = measured(service, "quiet again", options.seconds / 6, 2, expected, wrong)
         crashed, overdue = (int(service.metric(f"penumbra_workers_{what}_total")) for what in ("crashed", "overdue"))
         print(f"\n{hostile.kills} workers were killed, {crashed} ended by themselves or so, {overdue} were overdue. Hostile answers: "
               + ", ".join(f"{n} times {what}" for what, n in hostile.counts.most_common()) + ".")
@@ -176,11 +199,17 @@ def main():
             wrong.append(f"{lost} honest requests were lost by {hostile.kills} killed workers")
         if list(quiet) != ["200"] or list(after) != ["200"]:
             wrong.append(f"refused in quiet times: {dict(quiet)}, {dict(after)}")
+        if options.slow:
+            for seconds, *what in slow[: max(len(slow) // 50, 1)]:
+                print(f"{1000 * seconds:.0f} ms:", *what)
         half = len(samples) // 2
         first, second = (max(size for _, size in part) for part in (samples[:half], samples[half:]))
         print(f"Resident memory, at most: {first} MiB in the first half of the mix, {second} MiB in the second.")
         if second > MEMORY or (options.seconds >= 60 and second > 1.25 * first):
             wrong.append(f"memory rose from {first} to {second} MiB")
+    if options.log:
+        with open(options.log, "w", encoding="utf-8") as file:
+            file.write("\n".join(service.lines))
     if service.code != 0:
         wrong.append(f"exit code {service.code}")
     for line in sorted(set(wrong)):
@@ -189,4 +218,7 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1] == "--hostile":
+        Hostile(Visitor(int(sys.argv[2]), int(sys.argv[3]))).run()
+    else:
+        sys.exit(main())

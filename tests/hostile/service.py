@@ -54,31 +54,11 @@ def post(path, body, accept="image/x-portable-floatmap", content="multipart/form
     return request("POST", path, body, [f"Content-Type: {content}", f"Accept: {accept}"])
 
 
-class Service:
-    """Runs until it goes; its standard error is read all the time."""
+class Visitor:
+    """Requests to a service that runs, by its port and the id of its process."""
 
-    def __init__(self, program, *options):
-        self.lines, self.ready, self.port = [], threading.Event(), 0
-        self.process = subprocess.Popen([program, "--port", "0", *map(str, options)], stderr=subprocess.PIPE, text=True, errors="replace")
-        threading.Thread(target=self._read, daemon=True).start()
-        if not self.ready.wait(600) or not self.port:
-            raise SystemExit("the service did not get ready:\n" + "\n".join(self.lines))
-
-    def _read(self):
-        for line in self.process.stderr:
-            self.lines.append(line.rstrip("\n"))
-            if found := re.search(r"listening on .* port (\d+)", line):
-                self.port = int(found.group(1))
-            if line == "ready\n":
-                self.ready.set()
-        self.ready.set()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.send_signal(signal.SIGTERM)
-        self.code = self.process.wait(60)
+    def __init__(self, port, pid):
+        self.port, self.pid = port, pid
 
     def connect(self):
         return socket.create_connection(("127.0.0.1", self.port), timeout=120)
@@ -113,14 +93,14 @@ class Service:
     def workers(self):
         """Their process ids."""
         try:
-            with open(f"/proc/{self.process.pid}/task/{self.process.pid}/children") as file:
+            with open(f"/proc/{self.pid}/task/{self.pid}/children") as file:
                 main = [int(word) for word in file.read().split()]
         except OSError:
             return []
         others = []
-        for task in os.listdir(f"/proc/{self.process.pid}/task"):
+        for task in os.listdir(f"/proc/{self.pid}/task"):
             try:
-                with open(f"/proc/{self.process.pid}/task/{task}/children") as file:
+                with open(f"/proc/{self.pid}/task/{task}/children") as file:
                     others += [int(word) for word in file.read().split()]
             except OSError:
                 pass
@@ -128,10 +108,39 @@ class Service:
 
     def resident(self):
         """Bytes that front and workers have in memory together; what they share (files in memory, libraries) counts once."""
-        return sum(proportional(process) for process in [self.process.pid, *self.workers()])
+        return sum(proportional(process) for process in [self.pid, *self.workers()])
 
     def descriptors(self, process=None):
-        return len(os.listdir(f"/proc/{process or self.process.pid}/fd"))
+        return len(os.listdir(f"/proc/{process or self.pid}/fd"))
+
+
+class Service(Visitor):
+    """Runs until it goes; its standard error is read all the time."""
+
+    def __init__(self, program, *options):
+        super().__init__(0, 0)
+        self.lines, self.ready = [], threading.Event()
+        self.process = subprocess.Popen([program, "--port", "0", *map(str, options)], stderr=subprocess.PIPE, text=True, errors="replace")
+        self.pid = self.process.pid
+        threading.Thread(target=self._read, daemon=True).start()
+        if not self.ready.wait(600) or not self.port:
+            raise SystemExit("the service did not get ready:\n" + "\n".join(self.lines))
+
+    def _read(self):
+        for line in self.process.stderr:
+            self.lines.append(line.rstrip("\n"))
+            if found := re.search(r"listening on .* port (\d+)", line):
+                self.port = int(found.group(1))
+            if line == "ready\n":
+                self.ready.set()
+        self.ready.set()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        self.code = self.process.wait(60)
 
 
 def proportional(process):

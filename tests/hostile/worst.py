@@ -19,7 +19,7 @@ PATIENT = 20  # seconds of the service that is to decode much
 BUSY = 1.0  # seconds that a loaded machine may take to look
 MIB = 1 << 20
 
-LONG = bombs.quads({"kind": "ray_traced", "samples": 65536}, 64, 256)
+LONG = bombs.endless(256)
 
 
 def asked(service, data):
@@ -61,13 +61,13 @@ def busy_worker(service):
 
 
 def computing(service):
-    answer, seconds = asked(service, post("/v1/masks", form(LONG)))()
+    answer, seconds = asked(service, post("/v1/masks", form(*LONG)))()
     return answer, seconds, DEADLINE + BUSY
 
 
 def hanging(service):
     """Its worker stands still, as in a loop that nobody looks into."""
-    wait = asked(service, post("/v1/masks", form(LONG)))
+    wait = asked(service, post("/v1/masks", form(*LONG)))
     os.kill(busy_worker(service), signal.SIGSTOP)
     return *wait(), DEADLINE + GRACE + BUSY
 

@@ -71,6 +71,29 @@ TEST(Admission, SlotsGoToWhoCameFirst)
     EXPECT_EQ(order, (std::vector<int>{0, 1, 2, 3, 4}));
 }
 
+// Who steps aside leaves his slot; who leaves then leaves no slot.
+TEST(Admission, ALongRequestLeavesItsSlotWhileThereIsASpare)
+{
+    server::Gate gate(1, 8, 1);
+    const server::Deadline later(std::chrono::seconds(60)), now(std::chrono::seconds(0));
+    {
+        auto first = gate.enter(later);
+        EXPECT_TRUE(first.step_aside());
+        EXPECT_TRUE(first.step_aside()) << "it has";
+        auto second = gate.enter(later);
+        EXPECT_EQ(gate.counts().computing, 2U);
+        EXPECT_FALSE(second.step_aside()) << "there is one spare";
+        EXPECT_THROW((void)gate.enter(now), server::Problem);
+        { const auto gone = std::move(first); }
+        EXPECT_EQ(gate.counts().computing, 1U);
+        EXPECT_THROW((void)gate.enter(now), server::Problem) << "the slot is the second one's";
+        EXPECT_TRUE(second.step_aside());
+        const auto third = gate.enter(later);
+        EXPECT_EQ(gate.counts().computing, 2U);
+    }
+    EXPECT_EQ(gate.counts().computing, 0U);
+}
+
 TEST(Readiness, NotBeforeTheKnownMask)
 {
     Running cold{server::Options{}, false};

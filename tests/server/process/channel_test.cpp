@@ -48,13 +48,29 @@ TEST(Channel, SaysWhenTheOtherSideIsGoneOrLate)
 TEST(Channel, FilesGoBesideTheText)
 {
     auto [here, there] = Channel::pair();
-    const auto first = server::shared_copy("first"), second = server::shared_copy("");
-    ASSERT_TRUE(here.send("two", std::array{first.get(), second.get()}));
+    server::Outbox first, second;
+    ASSERT_TRUE(here.send("two", std::array{first.put("first"), second.put("")}));
     Message message;
     ASSERT_EQ(there.receive(message, Channel::Clock::now() + 10s), Channel::Got::message);
     ASSERT_EQ(message.files.size(), 2U);
-    EXPECT_EQ(server::copy_of(message.files[0]), "first");
-    EXPECT_EQ(server::copy_of(message.files[1]), "");
+    EXPECT_EQ(server::copy_of(message.files[0], 5), "first");
+    EXPECT_EQ(server::copy_of(message.files[0], 100), "first") << "no more than there is";
+    EXPECT_EQ(server::copy_of(message.files[1], 0), "");
+}
+
+// The next bytes take the place of the last ones; of those only that which is longer stays, and nobody asks for it.
+TEST(SharedBytes, AnOutboxIsUsedAgain)
+{
+    server::Outbox outbox;
+    const int file = outbox.put("a long text");
+    const server::Descriptor other(dup(file));
+    EXPECT_EQ(server::copy_of(other, 11), "a long text");
+    EXPECT_EQ(outbox.put("short"), file);
+    EXPECT_EQ(server::copy_of(other, 5), "short");
+    const std::string large(std::size_t{5} << 20, 'x');
+    outbox.put(large);
+    const server::Descriptor third(dup(outbox.put("after")));
+    EXPECT_EQ(server::copy_of(third, 100), "after") << "large ones are not kept";
 }
 
 TEST(SharedBytes, AreSeenOnBothSides)

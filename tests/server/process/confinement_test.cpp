@@ -1,6 +1,7 @@
 // What a worker may not do, tried by a process that has closed it to itself.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "process/confinement.hpp"
@@ -78,12 +80,20 @@ TEST_F(Confinement, FilesElsewhereKeepTheirLength)
     EXPECT_IN_CHILD(closed() && ::truncate((folder / "open" / "mine").c_str(), 0) == 0);
 }
 
+// One that came by another way serves nobody: it may not be connected, nor bound.
 TEST_F(Confinement, SocketsAndTracingAreRefused)
 {
+    EXPECT_IN_CHILD(server::close_calls() && ::socketpair(AF_UNIX, SOCK_DGRAM, 0, std::array<int, 2>{}.data()) < 0 && errno == EPERM);
+    const int before = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+    sockaddr_un address{.sun_family = AF_UNIX, .sun_path = "/run/nobody"};
+    const auto* const any = reinterpret_cast<const sockaddr*>(&address);
+    EXPECT_IN_CHILD(server::close_calls() && ::connect(before, any, sizeof(address)) < 0 && errno == EPERM);
+    EXPECT_IN_CHILD(server::close_calls() && ::bind(before, any, sizeof(address)) < 0 && errno == EPERM);
+    ::close(before);
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_INET, SOCK_STREAM, 0) < 0 && errno == EPERM);
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_INET6, SOCK_DGRAM, 0) < 0 && errno == EPERM);
     EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_NETLINK, SOCK_RAW, 0) < 0 && errno == EPERM);
-    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0);
+    EXPECT_IN_CHILD(server::close_calls() && ::socket(AF_UNIX, SOCK_STREAM, 0) < 0 && errno == EPERM);
     EXPECT_IN_CHILD(server::close_calls() && ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) < 0 && errno == EPERM);
 }
 
@@ -106,6 +116,20 @@ TEST_F(Confinement, NoWayAroundTheFilter)
     constexpr long x32 = 0x40000000;
     EXPECT_IN_CHILD(server::close_calls() && syscall(x32 | SYS_socket, AF_INET, SOCK_STREAM, 0) < 0 && errno == EPERM);
 #endif
+}
+
+// What workers share is written by the first process alone.
+TEST_F(Confinement, BuiltKernelsAreOutOfReachOfAWorker)
+{
+    if (syscall(SYS_landlock_create_ruleset, nullptr, 0, 1) < 2) GTEST_SKIP() << "this kernel has no Landlock";
+    const fs::path shared = folder / "shut", own = folder / "open";
+    const auto confined = [&](bool kernels) {
+        setenv("PENUMBRA_CACHE_DIR", shared.c_str(), 1);
+        return server::close_files(server::folders_of_a_worker(own.string(), kernels));
+    };
+    EXPECT_IN_CHILD(confined(false) && !can_open(shared / "new", O_WRONLY | O_CREAT) && !can_open(shared / "secret", O_RDONLY));
+    EXPECT_IN_CHILD(confined(false) && can_open(own / "new", O_WRONLY | O_CREAT));
+    EXPECT_IN_CHILD(confined(true) && can_open(shared / "new", O_WRONLY | O_CREAT));
 }
 
 TEST_F(Confinement, MemoryIsLimited)

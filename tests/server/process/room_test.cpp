@@ -27,12 +27,14 @@ TEST(Room, GivesWhatThereIsAndTakesItBack)
 
 TEST(Room, SharesAddUpToTheLimit)
 {
-    for (const std::int64_t mib : {256, 1500, 8000}) {
+    for (const std::int64_t mib : {256, 1500, 2000, 8000}) {
         server::Options options;
         options.memory = mib << 20;
         options.slots = 3;
+        options.spares = 2;
+        const std::uint64_t workers = 3 + server::spare_workers(options);
         const std::uint64_t limit = server::memory_limit(options);
-        EXPECT_LE(3 * server::worker_memory(options) + server::uploads_memory(options) + server::answers_memory(options), limit);
+        EXPECT_LE(workers * server::worker_memory(options) + server::uploads_memory(options) + server::answers_memory(options), limit);
         EXPECT_GT(server::uploads_memory(options), limit / 16);
     }
 }

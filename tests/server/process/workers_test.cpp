@@ -7,6 +7,11 @@
 #include <mutex>
 #include <random>
 
+#include <cstdlib>
+
+#include <sys/resource.h>
+
+#include "process/priority.hpp"
 #include "server/client.hpp"
 #include "server/program.hpp"
 
@@ -16,21 +21,21 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-server::Options options_with(std::int64_t deadline_s, std::int64_t slots = 2)
+server::Options options_with(std::int64_t deadline_s, std::int64_t slots = 2, std::int64_t spares = 0)
 {
     server::Options options;
     options.deadline_s = deadline_s;
     options.slots = slots;
+    options.spares = spares;
     options.rays = std::int64_t{1} << 40;
     return options;
 }
 
-// Seconds of rays.
-std::string long_request()
+// Seconds of rays, or as many as these are.
+std::string long_request(int samples = 16384)
 {
     nlohmann::json scene = scene_json();
-    scene["objects"] = {{{"quad", {{"center", {0, -1, 0}}, {"half_u", {0.5, 0, 0}}, {"half_v", {0, 0, -0.5}}}}}};
-    scene["technique"] = {{"kind", "ray_traced"}, {"samples", 65536}};
+    scene["technique"] = {{"kind", "depth_trace"}, {"samples", samples}}; // of which nobody estimates the time
     Parts slow = parts(scene);
     slow[2].second = text_of(encode_depth(flat(256, 256, 2)));
     return post(form(slow));
@@ -104,7 +109,8 @@ TEST(Workers, AnImageThatItsReaderNeverFinishesIsRefused)
 // What never comes back, whatever it hangs in, is ended at the deadline; the slot is free again.
 TEST(Workers, OneThatHangsIsEndedAtTheDeadline)
 {
-    Running running{options_with(2, 1)};
+    Running running{options_with(2, 1, 1)};
+    wait_for_idle(running.port, 2);
     const auto begun = Clock::now();
     std::string text;
     std::jthread client([&] {
@@ -170,14 +176,113 @@ TEST(Workers, EndWithTheService)
     const Program program({"--port", "0"});
     const int port = program.port_when_ready();
     ASSERT_NE(port, 0);
-    wait_for_idle(port, 2);
+    wait_for_idle(port, 3);
     const std::vector<pid_t> workers = children_of(program.process);
-    ASSERT_EQ(workers.size(), 2U);
+    ASSERT_EQ(workers.size(), 3U);
     kill(program.process, SIGKILL);
     program.wait();
     // Nobody is left to collect them: one that ended may stay as a zombie.
     for (int i = 0; i < 500 && std::ranges::any_of(workers, runs); ++i) std::this_thread::sleep_for(10ms);
     for (const pid_t process : workers) EXPECT_FALSE(runs(process)) << process;
+}
+
+int priority_of(pid_t process) { return getpriority(PRIO_PROCESS, static_cast<id_t>(process)); }
+
+// It goes on beside the slot, on what the others leave.
+TEST(Workers, OneThatIsBusyForLongHoldsUpNobody)
+{
+    Running running{options_with(60, 1, 1)};
+    wait_for_idle(running.port, 2);
+    Socket client(running.port);
+    client.send(long_request());
+    wait_for_busy(running.port, 1);
+    EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+    wait_for_busy(running.port, 1);
+    const auto lowered = [&] {
+        return std::ranges::count_if(running.service().workers().processes(), [](pid_t one) { return priority_of(one) > priority_of(getpid()); });
+    };
+    for (int i = 0; i < 500 && lowered() == 0; ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_EQ(lowered(), std::min<std::ptrdiff_t>(1, 19 - priority_of(getpid())));
+    EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+}
+
+// The second one of them has the slot: there is one spare.
+TEST(Workers, AsManyAsThereAreSparesMayBeBusyForLong)
+{
+    Running running{options_with(3, 1, 1)};
+    wait_for_idle(running.port, 2);
+    Socket first(running.port), second(running.port);
+    first.send(long_request());
+    wait_for_busy(running.port, 1);
+    second.send(long_request());
+    wait_for_busy(running.port, 2);
+    EXPECT_EQ(Reply(ask(running.port, honest_request())).status, 200) << "when they are over";
+    EXPECT_EQ(Reply(first.receive()).status, 504);
+    EXPECT_EQ(Reply(second.receive()).status, 504);
+}
+
+// The next request has all of the worker, or another one.
+TEST(Workers, PriorityComesBackWithTheAnswer)
+{
+    Running running{options_with(60, 1)};
+    Socket client(running.port);
+    client.send(long_request(512));
+    wait_for_busy(running.port, 1);
+    const pid_t before = running.service().workers().processes().front();
+    EXPECT_EQ(Reply(client.receive()).status, 200);
+    wait_for_idle(running.port, 1);
+    const pid_t after = running.service().workers().processes().front();
+    EXPECT_EQ(priority_of(after), priority_of(getpid()));
+    EXPECT_EQ(after == before, server::may_raise_priority());
+    wait_for_metric(running.port, "penumbra_workers_crashed_total 0");
+}
+
+// Another one that is warm takes its place at once.
+TEST(Workers, OneThatDiesCostsNobodyAWarmUp)
+{
+    Running running{options_with(60, 1, 1)};
+    wait_for_idle(running.port, 2);
+    for (int i = 0; i < 2; ++i) {
+        const auto started = running.service().workers().counts().started;
+        kill(running.service().workers().processes().front(), SIGKILL);
+        wait_for_metric(running.port, "penumbra_workers_crashed_total " + std::to_string(i + 1));
+        EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+        EXPECT_EQ(running.service().workers().counts().started, started) << "nobody waited for the new one";
+        wait_for_idle(running.port, 2);
+    }
+}
+
+// What workers write stays their own.
+TEST(Workers, TheFolderOfKernelsIsWrittenBeforeTheFirstRequest)
+{
+    std::string pattern = (std::filesystem::temp_directory_path() / "penumbra-kernels-XXXXXX").string();
+    const std::filesystem::path folder = mkdtemp(pattern.data());
+    const char* const old = std::getenv("PENUMBRA_CACHE_DIR");
+    const std::string before_it = old ? old : "";
+    setenv("PENUMBRA_CACHE_DIR", folder.c_str(), 1);
+    const auto times = [&] {
+        std::map<std::string, std::filesystem::file_time_type> all;
+        for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+            if (entry.is_regular_file()) all[entry.path()] = entry.last_write_time();
+        return all;
+    };
+    {
+        Running running{options_with(60, 1)};
+        const auto built = times();
+        EXPECT_GT(built.size(), 50U);
+        for (int i = 0; i < 2; ++i) {
+            EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+            kill(running.service().workers().processes().front(), SIGKILL);
+            wait_for_metric(running.port, "penumbra_workers_crashed_total " + std::to_string(i + 1));
+            wait_for_idle(running.port, 1);
+        }
+        EXPECT_EQ(ask(running.port, honest_request()).status, 200);
+        EXPECT_EQ(times(), built);
+        const auto& closed = running.service().greeting().closed;
+        EXPECT_NE(std::ranges::find(closed, "kernels that others load (copies)"), closed.end());
+    }
+    old ? setenv("PENUMBRA_CACHE_DIR", before_it.c_str(), 1) : unsetenv("PENUMBRA_CACHE_DIR");
+    std::filesystem::remove_all(folder);
 }
 
 // No two are alike, so that none has ended a worker before.
