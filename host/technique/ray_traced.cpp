@@ -35,21 +35,19 @@ double seconds_of_all(const PreparedRays& prepared, const Receiving& receivers, 
 {
     constexpr int most_receivers = 1024, most_samples = 64;
     const DepthMap& depth = *receivers.depth;
-    DepthMap some{.width = depth.width, .height = depth.height, .depth = std::vector<float>(depth.depth.size(), nothing_there)};
-    double chosen = 0;
+    const ChosenReceivers* list = receivers.chosen;
+    std::vector<std::uint32_t> some;
     for (const int number : spread_numbers(depth.width, depth.height, static_cast<int>(std::min<std::size_t>(depth.depth.size(), most_receivers)))) {
         const auto at = static_cast<std::size_t>(number);
-        if (!is_there(depth.depth[at]) || is_there(some.depth[at])) continue; // numbers of a small map come twice
-        some.depth[at] = depth.depth[at];
-        ++chosen;
+        if (is_there(depth.depth[at])) some.push_back(list ? list->pixels[at] : static_cast<std::uint32_t>(at));
     }
-    if (chosen == 0) return 0;
+    if (some.empty()) return 0;
     const int samples = std::min(prepared.settings.samples, most_samples);
     const auto start = std::chrono::steady_clock::now();
-    trace_visibility(*prepared.casters, prepared.light, some, receivers.camera, {.samples = samples},
-                     {.images = prepared.images, .surface = receivers.surface, .bounds = bounds});
+    trace_visibility(*prepared.casters, prepared.light, list ? list->depth : depth, receivers.camera, {.samples = samples},
+                     {.images = prepared.images, .surface = list ? list->surface : receivers.surface, .pixels = some});
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return seconds * all_receivers / chosen * samples_of_all(prepared.settings) / samples;
+    return seconds * all_receivers / static_cast<double>(some.size()) * samples_of_all(prepared.settings) / samples * rays_a_sample(bounds);
 }
 
 } // namespace
