@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 
 namespace penumbra::bench {
 namespace {
@@ -74,8 +73,6 @@ Row measure(const Engine& engine, const Scene& scene, const Technique& technique
         prepare.push_back(mask.report.prepare_ms);
         shade.push_back(mask.report.shade_ms);
         kernel.push_back(kernel_time(mask.report));
-        if (std::getenv("STAGES")) for (const Stage& st : mask.report.stages) std::fprintf(stderr, "%s %.2f/%.2f  ", st.name.c_str(), st.ms, st.device_ms);
-        if (std::getenv("STAGES")) std::fprintf(stderr, " total %.2f\n", mask.report.total_ms);
     }
     Row row{
         .bench = {}, .scene = {}, .technique = mask.report.technique, .settings = settings_text(mask.report), .error = {}, .shade_ms = {}};

@@ -53,28 +53,27 @@ Image kept_reference(const Engine& engine, const SuiteScene& scene)
 }
 
 const std::vector<std::string> usual{
-    "128@soft_shadow_map:visibility=sum",
-    "64@soft_shadow_map:visibility=union,tolerance=0.02",
-    "128@soft_shadow_map:visibility=union,tolerance=0.02",
-    "128@soft_shadow_map:visibility=union,tolerance=0.01",
-    "256@soft_shadow_map:visibility=union,tolerance=0.01",
-    "256@soft_shadow_map:visibility=union,tolerance=0.005",
-    "256@soft_shadow_map:visibility=union,tolerance=0",
-    "512@soft_shadow_map:visibility=union,tolerance=0.005",
-    "512@soft_shadow_map:visibility=union,tolerance=0.002",
-    "512@soft_shadow_map:visibility=union,tolerance=0",
+    "128@soft_shadow_map:preset=paper",
+    "soft_shadow_map:resolution=32,layers=0,tolerance=0.02",
+    "soft_shadow_map:resolution=64,layers=0,tolerance=0.02",
+    "soft_shadow_map:resolution=128,layers=0,tolerance=0.02",
+    "soft_shadow_map:resolution=128,tolerance=0.02",
+    "soft_shadow_map:resolution=128,layers=0,tolerance=0.01",
+    "soft_shadow_map:resolution=256,layers=0,tolerance=0.01",
+    "soft_shadow_map:layers=0,tolerance=0.02",
+    "soft_shadow_map:tolerance=0.02",
+    "soft_shadow_map:layers=0,tolerance=0.01",
+    "soft_shadow_map:tolerance=0.01",
+    "soft_shadow_map:layers=0",
+    "soft_shadow_map:",
+    "1024@soft_shadow_map:layers=0,tolerance=0.01",
+    "soft_shadow_volume:",
+    "occlusion_texture:",
     "ray_traced:samples=64,tolerance=0.02",
     "ray_traced:samples=256,tolerance=0.01",
-    "ray_traced:samples=1024,tolerance=0.005",
 };
-const std::vector<std::string> rival{"ray_traced:samples=16",
-                                     "ray_traced:samples=16,adaptive=true,first_samples=4",
-                                     "ray_traced:samples=32,adaptive=true,first_samples=8",
-                                     "ray_traced:samples=64,adaptive=true",
-                                     "ray_traced:samples=128,adaptive=true",
-                                     "ray_traced:samples=256,adaptive=true",
-                                     "ray_traced:samples=512,adaptive=true",
-                                     "ray_traced:samples=1024,adaptive=true"};
+const std::vector<std::string> rival{"ray_traced:samples=16,adaptive=true,first_samples=4", "ray_traced:samples=32,adaptive=true,first_samples=8", "ray_traced:samples=64,adaptive=true",
+                                     "ray_traced:samples=128,adaptive=true", "ray_traced:samples=256,adaptive=true", "ray_traced:samples=1024,adaptive=true"};
 
 } // namespace
 
