@@ -1,9 +1,7 @@
 // Soft Shadow Maps with a union: which of 32 x 32 samples of the light the micro-patches of one or two occluder maps hide, a bit each.
 //
-// Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. The samples are the
-// same for every receiver, so that the mask has no noise: (i, k) lies at u = (i + r(k)) / 32, v = (k + q(i)) / 32, with r(k) = (j + 1/2) / 32 and
-// q(i) = ((19 j + 25) mod 32 + 1/2) / 32, j being the number with its five bits reversed. A straight edge of any direction is resolved to 7/1024 at the
-// worst, 4/1024 on average, along an axis to 1/1024. (With r for q, places mirrored at the diagonal coincide, and an edge along it is off by 16/1024.)
+// Sums of patches (soft_shadow_map.cl) count twice what two patches hide, and leave gaps where they step; a union does neither. Which samples: see
+// common/light_pattern.clh.
 //
 // Specialisation constants: LANES, ITEM_ROWS, TILE_ROWS as in soft_shadow_map.cl
 #include "common/choices.h"
@@ -11,25 +9,10 @@
 #include "occluders.cl"
 #include "receivers.cl"
 #include "common/lanes.clh"
+#include "common/light_pattern.clh"
 #include "common/patch_limits.clh"
 #include "common/patch_search.clh"
 #include "common/stop.clh"
-
-#define SIDE 32 // samples along each side of the light
-
-#if LANES == 1
-typedef uint uintn;
-#define as_uintn as_uint
-#define convert_uintn convert_uint
-#elif LANES == 8
-typedef uint8 uintn;
-#define as_uintn as_uint8
-#define convert_uintn convert_uint8
-#else
-typedef uint16 uintn;
-#define as_uintn as_uint16
-#define convert_uintn convert_uint16
-#endif
 
 // --- Patches -----------------
 
@@ -103,18 +86,6 @@ __kernel void micro_patches(const int2 size, const float precision, const int ha
 
 // --- Bits -----------------
 
-// Columns i with q(i) below m / 32 less half a step: the first m in the order of (19 j + 25) mod 32, j being i with its bits reversed.
-__constant uint columns_below[SIDE + 1] = {
-    0x00000000u, 0x00800000u, 0x00800008u, 0x02800008u, 0x02804008u, 0x02844008u, 0x02844018u, 0x82844018u, 0x82844818u, 0x82a44818u, 0x82a4481au,
-    0x86a4481au, 0x86a4581au, 0x86a5581au, 0x86a5589au, 0xa6a5589au, 0xa6a55a9au, 0xa6e55a9au, 0xa6e55a9eu, 0xa7e55a9eu, 0xa7e5da9eu, 0xa7edda9eu,
-    0xa7eddabeu, 0xe7eddabeu, 0xe7eddebeu, 0xe7fddebeu, 0xe7fddebfu, 0xeffddebfu, 0xeffdfebfu, 0xeffffebfu, 0xeffffeffu, 0xfffffeffu, 0xffffffffu};
-
-// r(k), the phase of a row's samples, of a column.
-__constant float phases[SIDE] = {
-    0.015625f, 0.515625f, 0.265625f, 0.765625f, 0.140625f, 0.640625f, 0.390625f, 0.890625f, 0.078125f, 0.578125f, 0.328125f,
-    0.828125f, 0.203125f, 0.703125f, 0.453125f, 0.953125f, 0.046875f, 0.546875f, 0.296875f, 0.796875f, 0.171875f, 0.671875f,
-    0.421875f, 0.921875f, 0.109375f, 0.609375f, 0.359375f, 0.859375f, 0.234375f, 0.734375f, 0.484375f, 0.984375f};
-
 // Where an edge lies in the light, in samples: 0 to SIDE, and up to one beyond.
 inline floatn samples_at(const float edge, const floatn place, const floatn disparity, const floatn own, const floatn least, const float scale)
 {
@@ -122,23 +93,6 @@ inline floatn samples_at(const float edge, const floatn place, const floatn disp
     const floatn at = fma((edge - place) * scale, (float)SIDE / (d - own), (floatn)(0.5f * SIDE));
     const floatn low = select_lanes((floatn)(-1.0f), at, at > (floatn)(-1.0f));
     return select_lanes((floatn)(SIDE + 1), low, low < (floatn)(SIDE + 1));
-}
-
-// The samples' columns from ceil(u) on.
-inline uintn columns_from(const floatn u)
-{
-    const uintn first = convert_uintn(ceil(u));
-    return select_lanes((uintn)(0u), (uintn)(0xffffffffu) << (first & 31u), first < 32u);
-}
-
-// Columns whose samples lie below `part` of a row, 0 to 1.
-inline uintn columns_in(const floatn part)
-{
-    int counts[LANES];
-    uint columns[LANES];
-    store_int_lanes(convert_intn(ceil(fma(part, (floatn)(SIDE), (floatn)(-0.5f)))), counts);
-    for (int lane = 0; lane < LANES; ++lane) columns[lane] = columns_below[clamp(counts[lane], 0, SIDE)];
-    return load_lanes(columns);
 }
 
 inline float lowest_of(const floatn v)
