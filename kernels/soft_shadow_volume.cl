@@ -25,31 +25,7 @@
 #include "common/stop.clh"
 #include "coverage_table.cl"
 
-// LANES receivers.
-typedef struct {
-    floatn tx, ty, d;
-} Receivers;
-
-// The light's centre as seen along a receiver's line past a vertex: X = x - t z. The light-space origin of the plane through the vertex.
-inline floatn across(const float coordinate, const float z, const floatn t) { return fma((floatn)(-z), t, (floatn)(coordinate)); }
-
-// Whether the light's centre lies left of the line from a to b, both as `across` gives them; all ones where it does. One expression for triangles and for
-// silhouettes, always from the vertex of the lower number to the other, so that both decide alike to the last bit. A centre on the line is moved by
-// (e, e^2) for an e that is as small as need be: no point is on two sides, or on none.
-inline intn left_of(const floatn ax, const floatn ay, const floatn bx, const floatn by)
-{
-    const floatn area = fma(ax, by, -(bx * ay));
-    const floatn zero = (floatn)(0.0f);
-    intn left = area > zero;
-    const intn on = area == zero;
-#if LANES == 1
-    if (on) left = ay > by || (ay == by && bx > ax);
-#else
-    if (!NONE(on)) left |= on & ((ay > by) | ((ay == by) & (bx > ax)));
-#endif
-    return left;
-}
-
+#include "common/wedge_receivers.clh"
 #include "common/wedge_culling.clh"
 
 // --- The share of the light beyond an edge ----------------------------------------------------------------------------------------------
@@ -103,18 +79,6 @@ __attribute__((always_inline)) inline void shares_beyond(floatn* shares, const E
 #include "common/wedge_buffers.clh"
 
 // --- Shading ------------------------------------------------------------------------------------------------------------------------------
-
-__attribute__((always_inline)) inline Receivers receivers_at(const WedgeLight light, const int stride, __global const float* xi, __global const float* eta, __global const float* d,
-                              const int x, const int y)
-{
-    const int at = y * stride + x;
-    Receivers p;
-    p.d = load_lanes(d + at) * light.scale_d;
-    // Seen from the part's centre instead of the whole light's: t' = (p - c) / p.z.
-    p.tx = fma((floatn)(-light.centre_x), p.d, load_lanes(xi + at) * light.scale_x);
-    p.ty = fma((floatn)(-light.centre_y), p.d, load_lanes(eta + at) * light.scale_y);
-    return p;
-}
 
 // Where a triangle lies between the receivers and the light's centre. Row of 16 floats: the vertices a, b, c in order of their numbers; the plane's disparity
 // 1 / z = n.x t.x + n.y t.y + n.z; 1 where a, b, c turn counter-clockwise, seen from the light, else -1.
@@ -179,18 +143,6 @@ inline uint chosen(const Tile tile, __global const float* boxes, const int culli
     return below & above & (culling == CULLING_NONE ? 0xffffu : bits_of(boxes_meet(tile, boxes, use_reach)));
 }
 
-// Between which tangents y a row's receivers lie. Without one: nowhere.
-inline float2 span_of(const Receivers p)
-{
-    float y[LANES], d[LANES];
-    store_lanes(p.ty, y);
-    store_lanes(p.d, d);
-    float2 span = (float2)(0x1p60f, -0x1p60f);
-    for (int lane = 0; lane < LANES; ++lane)
-        if (d[lane] < 0x1p120f) span = (float2)(fmin(span.x, y[lane]), fmax(span.y, y[lane]));
-    return span;
-}
-
 // What a sheet adds to the occlusion of those before it, overlap sum. Of a surface that is not closed both sides hide, yet what they hide is mostly the same
 // light: the side that hides more counts, and the first one's occlusion waits for the other's in `first` (0 where the tile does not see it: no edge's share
 // and no triangle counts there).
@@ -211,20 +163,6 @@ inline floatn joined(const floatn before, const floatn sheet, const int overlap)
     if (overlap == OVERLAP_MAX) return more;
     if (overlap == OVERLAP_HALF_MIN) return saturate(fma(less, (floatn)(0.5f), more));
     return fma(-before, one, before + one);
-}
-
-inline void write_visibility(__global float* to, const floatn seen, const int left, const int add)
-{
-#if CHANNELS == 1
-    if (left >= LANES) {
-        store_lanes(add ? load_lanes(to) + seen : seen, to);
-        return;
-    }
-#endif
-    float lanes[LANES];
-    store_lanes(seen, lanes);
-    const int count = left < LANES ? left : LANES;
-    for (int lane = 0; lane < count; ++lane) to[lane * CHANNELS] = add ? to[lane * CHANNELS] + lanes[lane] : lanes[lane];
 }
 
 // soft_shadow_volume: one light, or one part of it.
