@@ -212,13 +212,24 @@ inline void add_to_row(Counters* n, const int k, uintn columns, const uintn minu
     }
 }
 
+#if LANES == 1
+inline float highest_of(const floatn v) { return v; }
+#else
+inline float highest_of_four(const float4 v)
+{
+    const float2 a = select(v.lo, v.hi, v.hi > v.lo);
+    return a.x > a.y ? a.x : a.y;
+}
+#if LANES == 8
+inline float highest_of(const floatn v) { return highest_of_four(select(v.lo, v.hi, v.hi > v.lo)); }
+#else
 inline float highest_of(const floatn v)
 {
-    float lanes[LANES], high = -MAXFLOAT;
-    store_lanes(v, lanes);
-    for (int lane = 0; lane < LANES; ++lane) high = lanes[lane] > high ? lanes[lane] : high;
-    return high;
+    const float8 a = select(v.lo, v.hi, v.hi > v.lo);
+    return highest_of_four(select(a.lo, a.hi, a.hi > a.lo));
 }
+#endif
+#endif
 
 // A part of an edge as receivers see it, from its lower end to its upper: heights v in rows, places u in columns, on the line u = at + slope v. `counts`: where there
 // is one.
@@ -227,12 +238,8 @@ typedef struct {
     intn counts;
 } Rise;
 
-// Of a row's 32 heights those below v.
-inline intn heights_below(const floatn v, const floatn row)
-{
-    const floatn part = v - row, low = select_lanes((floatn)(0.0f), part, part > (floatn)(0.0f)), high = select_lanes((floatn)(1.0f), low, low < (floatn)(1.0f));
-    return convert_intn(ceil(fma(high, (floatn)(SIDE), (floatn)(-0.5f))));
-}
+// Of the 32 heights of a row those below `part` of it, 0 to 1.
+inline intn heights_below(const floatn part) { return convert_intn(ceil(fma(part, (floatn)(SIDE), (floatn)(-0.5f)))); }
 
 inline uintn columns_of(const intn heights)
 {
@@ -247,14 +254,20 @@ inline uintn columns_of(const intn heights)
 inline void add_rise(Counters* n, const Rise e, const uintn minus, const int first)
 {
     const floatn zero = (floatn)(0.0f), top = (floatn)(SIDE);
-    const floatn v0 = select_lanes(zero, e.v0, e.v0 > zero), v1 = select_lanes(top, e.v1, e.v1 < top);
-    const intn some = e.counts & (v1 > v0);
+    // In the light's rows, whatever a lane without an edge holds.
+    const floatn low0 = select_lanes(zero, e.v0, e.v0 > zero), low1 = select_lanes(zero, e.v1, e.v1 > zero);
+    const floatn v0 = select_lanes(top, low0, low0 < top), v1 = select_lanes(top, low1, low1 < top);
+    const floatn row0 = floor(v0), row1 = floor(v1);
+    const intn below = heights_below(v0 - row0), above = heights_below(v1 - row1);
+    // Where it spans a sample's height at all.
+    const intn some = e.counts & ((row1 > row0) | (above > below)) & (v1 > v0);
     if (NONE(some)) return;
+    const uintn not_below = ~columns_of(below), not_above = columns_of(above);
     const floatn left = select_lanes(e.u1, e.u0, e.u0 < e.u1), right = select_lanes(e.u0, e.u1, e.u0 < e.u1);
-    const int from = convert_int(-highest_of(select_lanes(-top, -floor(v0), some))), to = min(convert_int(highest_of(select_lanes(zero, v1, some))), SIDE - 1);
+    const int from = convert_int(-highest_of(select_lanes(-top, -row0, some))), to = min(convert_int(highest_of(select_lanes(zero, row1, some))), SIDE - 1);
     for (int k = from; k <= to; ++k) {
         const floatn row = (floatn)(k);
-        const intn below = heights_below(v0, row), above = heights_below(v1, row), spans = some & (above > below);
+        const intn spans = some & (row >= row0) & (row <= row1);
         if (NONE(spans)) continue;
         // Columns that the edge goes through are asked one by one, those right of it for all receivers not at all.
         const floatn at_row = fma(row, e.slope, e.at), at_next = at_row + e.slope;
@@ -266,7 +279,7 @@ inline void add_rise(Counters* n, const Rise e, const uintn minus, const int fir
             const floatn at = fma(e.slope, (floatn)(heights[i]), at_row), u = select_lanes(right, select_lanes(left, at, at > left), at < right);
             columns |= select_lanes((uintn)(0u), (uintn)(1u << i), (floatn)((float)i + phases[k]) >= u);
         }
-        if (!ALL((below == (intn)(0)) & (above == (intn)(SIDE)))) columns &= columns_of(above) & ~columns_of(below);
+        columns &= select_lanes((uintn)(0xffffffffu), not_below, row == row0) & select_lanes((uintn)(0xffffffffu), not_above, row == row1);
         add_to_row(n, k, select_lanes((uintn)(0u), columns, spans), minus, first);
     }
 }
