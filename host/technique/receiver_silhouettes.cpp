@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "scene/stop.hpp"
+#include "technique/spatial_order.hpp"
 
 namespace penumbra {
 namespace {
@@ -166,47 +166,6 @@ std::array<double, 3> place_of(const Vec3& p)
     return {std::clamp(p.x * near, -everywhere, everywhere), std::clamp(p.y * near, -everywhere, everywhere), near};
 }
 
-// What lies beside each other comes beside each other: ranges are cut in two, in whole groups (of groups), where `Keys` spread most.
-template <std::size_t count> class Order {
-public:
-    using Keys = std::array<float, count>;
-
-    explicit Order(std::vector<Keys> keys) : keys_(std::move(keys)), order_(keys_.size())
-    {
-        std::iota(order_.begin(), order_.end(), 0U);
-        cut(0, order_.size());
-    }
-    const std::vector<std::uint32_t>& get() const { return order_; }
-
-private:
-    void cut(std::size_t begin, std::size_t end)
-    {
-        const std::size_t size = end - begin;
-        if (size <= group_size) return;
-        if (size > 65536) check_stop();
-        Keys low = keys_[order_[begin]], high = low;
-        for (std::size_t i = begin; i < end; ++i)
-            for (std::size_t k = 0; k < count; ++k) {
-                low[k] = std::min(low[k], keys_[order_[i]][k]);
-                high[k] = std::max(high[k], keys_[order_[i]][k]);
-            }
-        std::size_t widest = 0;
-        for (std::size_t k = 1; k < count; ++k)
-            if (high[k] - low[k] > high[widest] - low[widest]) widest = k;
-        const std::size_t unit = size > group_size * group_size ? group_size * group_size : group_size;
-        const std::size_t middle = begin + (size / 2 + unit - 1) / unit * unit;
-        const auto at = [this](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-        std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-            return keys_[a][widest] != keys_[b][widest] ? keys_[a][widest] < keys_[b][widest] : a < b;
-        });
-        cut(begin, middle);
-        cut(middle, end);
-    }
-
-    std::vector<Keys> keys_;
-    std::vector<std::uint32_t> order_;
-};
-
 // A box of places, and what range planes have there.
 struct Box {
     std::array<double, 2> low{everywhere, everywhere}, high{-everywhere, -everywhere};
@@ -298,10 +257,10 @@ public:
             const auto &a = planes_[edges[i].faces[0]].values, &b = planes_[edges[i].faces[1]].values;
             keys.push_back({place[0], place[1], place[2], (a[0] + b[0]) * normal_weight, (a[1] + b[1]) * normal_weight, (a[2] + b[2]) * normal_weight});
         }
-        add_groups(edges, smooth, Order<6>(std::move(keys)).get());
+        add_groups(edges, smooth, SpatialOrder<6>(std::move(keys)).get());
         std::vector<std::array<float, 3>> places;
         for (const std::uint32_t i : always) places.push_back(key_of(all_.points[edges[i].low], all_.points[edges[i].high]));
-        add_groups(edges, always, Order<3>(std::move(places)).get());
+        add_groups(edges, always, SpatialOrder<3>(std::move(places)).get());
         data_.edge_count = edges.size();
     }
 
@@ -316,7 +275,7 @@ public:
             keys.push_back({key[0], key[1]});
         }
         data_.triangle_count = counted.size();
-        const Order<2> order(std::move(keys));
+        const SpatialOrder<2> order(std::move(keys));
         const std::size_t groups = (counted.size() + group_size - 1) / group_size;
         data_.triangle_sets.assign(std::max<std::size_t>(groups, 1) * 256, 0.0F);
         triangle_groups_.resize(groups);

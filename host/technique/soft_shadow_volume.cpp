@@ -114,9 +114,9 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
 // What of a part goes to the device.
 double bytes_of(const WedgeData& data)
 {
-    const std::size_t floats = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() +
-                               data.triangle_boxes.size() + data.triangle_extents.size() + data.triangles.size();
-    return static_cast<double>(floats) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
+    const std::size_t words = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() +
+                              data.triangle_boxes.size() + data.triangle_groups.size();
+    return static_cast<double>(words) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
 }
 
 PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data, const WedgeLight& light)
@@ -132,8 +132,7 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
             .edge_ends = floats(data.edge_ends, "ends of edges"),
             .edges = floats(data.edges, "edges"),
             .triangle_boxes = floats(data.triangle_boxes, "boxes of triangles"),
-            .triangle_extents = floats(data.triangle_extents, "extents of triangles"),
-            .triangles = floats(data.triangles, "triangles")};
+            .triangle_groups = work.upload(std::span<const cl_int>(data.triangle_groups), "facing triangles")};
 }
 
 PreparedSoftShadowVolume::Counted upload(opencl::Work& work, const ReceiverSilhouettes& data, const WedgeLight& light)
@@ -159,7 +158,8 @@ struct PartWedges {
     std::size_t sheets = 0;
 };
 
-PartWedges wedges_of(const Topology& topology, const LightFrame& frame, const LightPart& part, const SoftShadowVolume& settings)
+PartWedges wedges_of(const Topology& topology, const WedgeTriangles& triangles, const LightFrame& frame, const LightPart& part,
+                     const SoftShadowVolume& settings)
 {
     const bool extent = frame.half_u > 0 || frame.half_v > 0;
     PartWedges wedges;
@@ -169,7 +169,7 @@ PartWedges wedges_of(const Topology& topology, const LightFrame& frame, const Li
         silhouette = wedges.linear.silhouette;
     }
     wedges.sheets = silhouette.sheets();
-    wedges.data = wedge_data(topology, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
+    wedges.data = wedge_data(topology, triangles, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
     return wedges;
 }
 
@@ -315,6 +315,8 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     PreparedSoftShadowVolume prepared{.settings = settings,
                                       .channels = 1,
                                       .program = program(work.context().quirks().lanes, frame.shape, settings, 1),
+                                      .triangle_extents = {},
+                                      .triangle_rows = {},
                                       .parts = {},
                                       .counted = {},
                                       .edges = 0,
@@ -334,11 +336,14 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     std::uint64_t left_out = 0, unshared = 0;
     const std::vector<LightPart> parts = light_parts(frame, splits);
     // As many parts at a time as there are threads: the host never holds the wedges of all.
+    const WedgeTriangles triangles = wedge_triangles(casters.topology, frame, parts);
+    prepared.triangle_rows = work.upload(std::span<const float>(triangles.rows), "triangles");
+    prepared.triangle_extents = work.upload(std::span<const float>(triangles.extents), "extents of triangles");
     std::vector<PartWedges> batch(std::min<std::size_t>(thread_count(), parts.size()));
     for (std::size_t first = 0; first < parts.size(); first += batch.size()) {
         const std::size_t count = std::min(batch.size(), parts.size() - first);
         parallel_for(static_cast<int>(count), [&](int i) {
-            batch[static_cast<std::size_t>(i)] = wedges_of(casters.topology, frame, parts[first + static_cast<std::size_t>(i)], settings);
+            batch[static_cast<std::size_t>(i)] = wedges_of(casters.topology, triangles, frame, parts[first + static_cast<std::size_t>(i)], settings);
         });
         for (std::size_t i = 0; i < count; ++i) {
             const auto& [wedges, data, sheets] = batch[i];
@@ -411,9 +416,10 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
         WedgeLight light = seen_by(part.light);
         light.first = i == 0;
         work.launch(prepared.program, "soft_shadow_volume", {width / lanes, height / rows}, group,
-                    width * height * 16 + part.triangles.bytes() + part.edges.bytes(), view, light,
+                    width * height * 16 + prepared.triangle_rows.bytes() + part.edges.bytes(), view, light,
                     eye_of(view, light, prepared.settings.culling == WedgeCulling::far_depth), part.sheets, part.sheet_boxes,
-                    part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_extents, part.triangles, bounds,
+                    part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_groups,
+                    prepared.triangle_extents, prepared.triangle_rows, bounds,
                     receivers.xi, receivers.eta, receivers.d, visibility, evaluated, part.coverage,
                     static_cast<cl_int>(prepared.settings.table), work.stop());
     }

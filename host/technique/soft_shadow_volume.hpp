@@ -19,7 +19,8 @@ struct PreparedSoftShadowVolume {
         WedgeLight light{};
         opencl::Buffer<Sheet> sheets;
         opencl::Buffer<float> coverage; // texture: the table; linear: the planes of wedges; else none
-        opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes, triangle_extents, triangles;
+        opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes;
+        opencl::Buffer<cl_int> triangle_groups;
     };
     // What silhouettes from each receiver need.
     struct Counted {
@@ -30,6 +31,7 @@ struct PreparedSoftShadowVolume {
     SoftShadowVolume settings;
     int channels = 1; // of the visibility: 3 for a coloured texture
     opencl::Specialisation program;
+    opencl::Buffer<float> triangle_extents, triangle_rows; // of all parts
     std::vector<Part> parts;
     std::optional<Counted> counted; // instead of parts
     std::uint64_t edges = 0, triangles = 0, sheets = 0; // of all parts
