@@ -20,6 +20,7 @@ void large(const Engine& engine);               // 4096 x 4096 receivers, 2048 x
 void wedges(const Engine& engine);              // soft_shadow_volume: overlap, splits, spheres, beside rays
 void wedge_culling(const Engine& engine);       // what each culling spares; the light's size
 void wedge_models(const Engine& engine);        // soft_shadow_volume on several meshes beside soft_shadow_map and rays
+void wedge_silhouettes(const Engine& engine);   // soft_shadow_volume with silhouettes from each receiver, on meshes, light sizes, triangles
 void wedge_growth(const Engine& engine);        // its time over silhouette edges and over receivers
 void occlusion(const Engine& engine);           // occlusion_texture: slices, resolution, filters, combination, placement, beside rays
 void occlusion_filters(const Engine& engine);   // its three filters: error, roughness, build and bandwidth (Fig. 2)

@@ -30,6 +30,7 @@ constexpr Case cases[] = {
     {"wedges", wedges, "soft_shadow_volume: overlap, light splits, spheres, beside Embree's"},
     {"wedge_culling", wedge_culling, "soft_shadow_volume: what each culling spares (Papers II and IV); the light's size"},
     {"wedge_models", wedge_models, "soft_shadow_volume on five meshes, beside soft_shadow_map and Embree's"},
+    {"wedge_silhouettes", wedge_silhouettes, "soft_shadow_volume: silhouettes from each receiver beside the light's centre's and rays"},
     {"wedge_growth", wedge_growth, "soft_shadow_volume: time over silhouette edges, and over receivers"},
     {"occlusion", occlusion, "occlusion_texture: its settings, beside the other techniques and Embree's"},
     {"occlusion_filters", occlusion_filters, "N-buffers, mip-maps, summed-area tables: error, roughness, bandwidth (Fig. 2)"},

@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 bench=${PENUMBRA_BENCH:-build/release/bench/penumbra_bench}
 [ -x "$bench" ] || { echo "bench/run.sh: $bench is missing: build first (./check builds it)" >&2; exit 2; }
 mkdir -p out/bench docs/pictures
-[ $# -gt 0 ] || set -- limits image_io suite bunny baselines texels accumulators resolution light_size lateral vertical large wedges wedge_culling wedge_models wedge_growth smoothies smoothie_light_size occlusion occlusion_filters occlusion_light occlusion_casters occlusion_sheet
+[ $# -gt 0 ] || set -- limits image_io suite bunny baselines texels accumulators resolution light_size lateral vertical large wedges wedge_culling wedge_models wedge_silhouettes wedge_growth smoothies smoothie_light_size occlusion occlusion_filters occlusion_light occlusion_casters occlusion_sheet
 for name in "$@"; do
     echo "bench $name" >&2
     "$bench" "$name" > "out/bench/$name.csv.part"

@@ -44,12 +44,12 @@ void smoothies(const Engine& engine)
             const auto row = [&](const Technique& technique) { emit(engine, scene, technique, reference, "smoothies", texels, 9); };
             row(ShadowMap{});
             row(ShadowMap{.filter = ShadowFilter::bicubic});
-            row(Smoothie{});
+            row(Smoothie{.two_sided = false});
             row(Smoothie{.two_sided = true});
-            row(Smoothie{.silhouettes = SilhouetteSource::image});
+            row(Smoothie{.silhouettes = SilhouetteSource::image, .two_sided = false});
         }
         for (const double t : {0.02, 0.05, 0.1, 0.2})
-            emit(engine, scene_of(1024), Smoothie{.t_from = SmoothieWidth::t, .t = t}, reference, "smoothie_width", t, 9);
+            emit(engine, scene_of(1024), Smoothie{.t_from = SmoothieWidth::t, .t = t, .two_sided = false}, reference, "smoothie_width", t, 9);
     }
 }
 
@@ -61,7 +61,7 @@ void smoothie_light_size(const Engine& engine)
             const Image reference = reference_of(engine, scene, 1024);
             const auto row = [&](const Technique& technique) { emit(engine, scene, technique, reference, "smoothie_light_size", side, 5); };
             row(ShadowMap{});
-            row(Smoothie{});
+            row(Smoothie{.two_sided = false});
             row(Smoothie{.two_sided = true});
             row(SoftShadowMap{.sides = occluder == Occluder::square ? Sides::front : Sides::both});
         }

@@ -12,7 +12,7 @@ printf '%s\n' "$rows" | awk -F, '
     # Settings that are at their defaults say nothing.
     { s = " " $4 " "
       gsub(" t_from=light t=0[.]05 ", " ", s)
-      n = split("preset=default preset=paper tolerance=0 layers=0 visibility=sum silhouettes=object falloff=sinusoidal two_sided=false placement=uniform projection_centre=light prefilter=summed_area storage=normalized16 combine=layered_max layers=4 leak_fix=false self_shadow=auto coverage=analytic overlap=sum light_splits=1 table=32 lookup=quadrilinear buffer=binary32 culling=tight smooth=false corner_wedges=0 resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
+      n = split("preset=default preset=paper tolerance=0 layers=0 visibility=sum silhouettes=object silhouettes=centre falloff=sinusoidal two_sided=false placement=uniform projection_centre=light prefilter=summed_area storage=normalized16 combine=layered_max layers=4 leak_fix=false self_shadow=auto coverage=analytic overlap=sum light_splits=1 table=32 lookup=quadrilinear buffer=binary32 culling=tight smooth=false corner_wedges=0 resolution=0 reduction=area accumulator=binary32 bias=1 project=false project_resolution=512 seed=1 first_samples=16 adaptive=false", d, " ")
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       for (i = 1; i <= n; i++) gsub(" " d[i] " ", " ", s)
       gsub(/^ +| +$/, "", s)

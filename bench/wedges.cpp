@@ -16,6 +16,12 @@ void rays(const Engine& engine, const Scene& scene, const Image& reference, cons
         }
 }
 
+const std::pair<const char*, std::string> models[] = {{"bunny", "/usr/share/glmark2/models/bunny.obj"},
+                                                      {"horse", "/usr/share/glmark2/models/horse.3ds"},
+                                                      {"wuson", "/usr/share/assimp/models/PLY/Wuson.ply"},
+                                                      {"spider", "/usr/share/assimp/models/OBJ/spider.obj"},
+                                                      {"engine", "/usr/share/assimp/models/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"}};
+
 RayTraced adaptive(int samples) { return {.samples = samples, .adaptive = true, .first_samples = 16, .seed = 1}; }
 
 // Edges of the silhouette that the light's centre sees.
@@ -71,13 +77,7 @@ void wedge_culling(const Engine& engine)
 
 void wedge_models(const Engine& engine)
 {
-    const std::string models = "/usr/share/assimp/models/", glmark2 = "/usr/share/glmark2/models/";
-    const std::pair<const char*, std::string> list[] = {{"bunny", glmark2 + "bunny.obj"},
-                                                        {"horse", glmark2 + "horse.3ds"},
-                                                        {"wuson", models + "PLY/Wuson.ply"},
-                                                        {"spider", models + "OBJ/spider.obj"},
-                                                        {"engine", models + "glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"}};
-    for (const auto& [name, path] : list) {
+    for (const auto& [name, path] : models) {
         const TriangleMesh mesh = fitted_mesh(path);
         const Scene scene = paper_scene(name, mesh, {});
         const Image reference = reference_of(engine, scene, 4096);
@@ -90,6 +90,25 @@ void wedge_models(const Engine& engine)
                      "wedge_models", texels, 9);
         emit(engine, scene, RayTraced{.samples = 16, .adaptive = false, .first_samples = 16, .seed = 1}, reference, "wedge_models", 16, 5);
         for (const int samples : {64, 256}) emit(engine, scene, adaptive(samples), reference, "wedge_models", samples, 3);
+    }
+}
+
+void wedge_silhouettes(const Engine& engine)
+{
+    const SoftShadowVolume per_receiver{.silhouettes = Silhouettes::per_receiver};
+    const auto rows = [&](const Scene& scene, double parameter, const char* bench) {
+        const Image reference = reference_of(engine, scene, 4096);
+        emit(engine, scene, SoftShadowVolume{}, reference, bench, parameter, 5);
+        emit(engine, scene, SoftShadowVolume{.light_splits = 4}, reference, bench, parameter, 5);
+        emit(engine, scene, per_receiver, reference, bench, parameter, 5);
+        emit(engine, scene, RayTraced{.samples = 1024, .adaptive = true, .first_samples = 16, .seed = 1}, reference, bench, parameter, 3);
+    };
+    for (const auto& [name, path] : models) rows(paper_scene(name, fitted_mesh(path), {}), 1, "wedge_silhouettes");
+    for (const double side : {0.1, 0.3, 3.0}) rows(paper_scene(Occluder::bunny, {.light_side = side}), side, "wedge_silhouettes_light");
+    for (const std::uint32_t rings : {22U, 45U, 89U, 179U, 358U}) {
+        const TriangleMesh mesh = bumpy_ball(rings);
+        const Scene scene = paper_scene("ball", mesh, {});
+        emit(engine, scene, per_receiver, reference_of(engine, scene, 1024), "wedge_silhouettes_growth", static_cast<double>(mesh.triangles.size()), 5);
     }
 }
 

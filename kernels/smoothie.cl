@@ -91,21 +91,67 @@ inline int16 reach(const SmoothieView view, __global const float* boxes, const f
     return (vload16(1, boxes) + width >= x0) & (vload16(0, boxes) - width <= x1) & (vload16(3, boxes) + width >= y0) & (vload16(2, boxes) - width <= y1) & (near > 0.0f);
 }
 
-// The furthest that the map shows within a texel of an edge's nearest point. The outline that the map shows is made of silhouette edges, which have the bare map
-// right beside them, in whatever direction they zigzag along it; others lie inside it. 0 where nothing is.
-inline floatn beside(const SmoothieView view, const Nearest n, __global const float2* texels)
+// --- Where the light gets past what the map shows -----------------
+
+// Whether a texel hides its furthest receiver from the light. Where no receiver is anywhere near: whether anything is there.
+inline bool covers(const float shown, const int nearest, const int furthest) { return shown > (nearest == 0 ? 0.0f : as_float(furthest)) * (1.0f + 0x1p-10f); }
+
+// bare_in_row: how many texels to the left (negative) or right of each the next one is that hides nothing, 0 of itself; twice the map's width: none. What is beyond the
+// map nobody knows: no outline is there.
+//
+// Launched over the texels.
+__kernel void bare_in_row(const int2 size, __global const float2* restrict texels, __global const int* restrict nearest, __global const int* restrict furthest,
+                          __global int* restrict to)
 {
-    float x[LANES], y[LANES], found[LANES];
-    store_lanes((n.x - view.left) / view.step_x, x);
-    store_lanes((view.top - n.y) / view.step_y, y);
-    for (int lane = 0; lane < LANES; ++lane) {
-        found[lane] = NO_RECEIVER;
-        const int column = (int)rint(clamp(x[lane], -2.0f, view.width + 1.0f)), row = (int)rint(clamp(y[lane], -2.0f, view.height + 1.0f));
-        for (int j = row - 1; j <= row + 1; ++j)
-            for (int i = column - 1; i <= column + 1; ++i)
-                found[lane] = fmin(found[lane], i >= 0 && j >= 0 && i < view.width && j < view.height ? texels[j * view.width + i].x : 0.0f);
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const int row = y * size.x;
+    int found = 2 * size.x;
+    for (int steps = 0; steps < size.x && found == 2 * size.x; ++steps) {
+        const int left = x - steps, right = x + steps;
+        if (left >= 0 && !covers(texels[row + left].x, nearest[row + left], furthest[row + left])) found = -steps;
+        else if (right < size.x && !covers(texels[row + right].x, nearest[row + right], furthest[row + right])) found = steps;
     }
-    return load_lanes(found);
+    to[row + x] = found;
+}
+
+// bare_place: where the nearest texel that hides nothing is for each texel, how many texels to the right and below; twice the map's size: nowhere. By distance in the
+// light's image; of several the one above, then that to the left.
+//
+//   in_row   bare_in_row's
+//
+// Launched over the texels.
+__kernel void bare_place(const int2 size, const float2 step, __global const int* restrict in_row, __global int2* restrict to)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    int2 place = size * 2;
+    float least = MAXFLOAT;
+    for (int rows = 0; rows < size.y; ++rows) {
+        const float up = rows * step.y;
+        if (up * up >= least) break;
+        for (int side = -1; side <= 1; side += 2) {
+            const int row = y + side * rows;
+            if (row < 0 || row >= size.y || in_row[row * size.x + x] == 2 * size.x) continue;
+            const int columns = in_row[row * size.x + x];
+            const float square = fma(columns * step.x, columns * step.x, up * up);
+            if (square >= least) continue;
+            least = square;
+            place = (int2)(columns, side * rows);
+        }
+    }
+    to[y * size.x + x] = place;
+}
+
+// The same for one texel from the map alone, where no edge passes by the nearest bare texel, `away` texels to the right and below: (distance, disparity). The outline
+// lies halfway between that and the texel before it, which is the blocker there.
+inline float2 inner_of_map(const SmoothieView view, __global const float2* texels, const int x, const int y, const int2 away)
+{
+    const float2 to = (float2)(away.x * view.step_x, away.y * view.step_y);
+    const float distance = sqrt(fma(to.x, to.x, to.y * to.y));
+    const int2 back = convert_int2_rte(to / (distance * (float2)(view.step_x, view.step_y)) * fmin(view.step_x, view.step_y));
+    const int2 at = clamp((int2)(x, y) + away - back, (int2)(0), (int2)(view.width - 1, view.height - 1));
+    return (float2)(fmax(distance - 0.5f * fmin(view.step_x, view.step_y), 0.0f), texels[at.y * view.width + at.x].x);
 }
 
 inline void store_texels(__global float* to, const floatn values, const int left)
@@ -123,6 +169,7 @@ inline void store_texels(__global float* to, const floatn values, const int left
 //   boxes, edge_boxes, edges     of groups, blocks of 16; of the edges of each group; [groups][16][8]
 //   texels                       the occluder map: disparity, covered share
 //   nearest, furthest            disparities of the nearest and the furthest receiver, as bits
+//   bare                         two_sided: bare_place
 //   distances, depths [height][width]   from the silhouette; disparity 0 where there is no smoothie
 //   inner_distances, inner_depths   two_sided: distance from the silhouette on its inner side (negative: none), and its disparity
 //   evaluated                    edges that were evaluated against the texels of each work-item
@@ -131,31 +178,41 @@ inline void store_texels(__global float* to, const floatn values, const int left
 // Launched over work-items, (width / LANES) x (height / BUFFER_ROWS), both rounded up.
 __kernel void smoothie_buffer(const SmoothieView view, __global const float* restrict boxes, __global const float* restrict edge_boxes,
                               __global const float* restrict edges, __global const float2* restrict texels, __global const int* restrict nearest,
-                              __global const int* restrict furthest, __global float* restrict distances, __global float* restrict depths,
-                              __global float* restrict inner_distances, __global float* restrict inner_depths, __global uint* restrict evaluated,
+                              __global const int* restrict furthest, __global const int2* restrict bare, __global float* restrict distances,
+                              __global float* restrict depths, __global float* restrict inner_distances, __global float* restrict inner_depths, __global uint* restrict evaluated,
                               __global const volatile int* stop)
 {
     const int first_x = get_global_id(0) * LANES, first_y = get_global_id(1) * BUFFER_ROWS;
     if (first_x >= view.width || first_y >= view.height) return;
     const floatn zero = (floatn)(0.0f), one = (floatn)(1.0f);
-    floatn alpha[BUFFER_ROWS], distance[BUFFER_ROWS], depth[BUFFER_ROWS], slack[BUFFER_ROWS], inner[BUFFER_ROWS], share[BUFFER_ROWS], inner_depth[BUFFER_ROWS], r[BUFFER_ROWS], behind[BUFFER_ROWS], map[BUFFER_ROWS];
+    floatn alpha[BUFFER_ROWS], distance[BUFFER_ROWS], depth[BUFFER_ROWS], slack[BUFFER_ROWS], inner[BUFFER_ROWS], share[BUFFER_ROWS], inner_depth[BUFFER_ROWS], open_x[BUFFER_ROWS], open_y[BUFFER_ROWS], least_inner[BUFFER_ROWS], r[BUFFER_ROWS], behind[BUFFER_ROWS], map[BUFFER_ROWS];
     floatn x, least = (floatn)(NO_RECEIVER);
+    // The outline passes between a texel that hides and one beside it that does not: within a texel and a half of the latter's middle; from inside it is
+    // no nearer than half a diagonal before that. Edges that zigzag inside it are.
+    const float around = 1.5f * fmax(view.step_x, view.step_y), half_diagonal = 0.5f * sqrt(view.step_x * view.step_x + view.step_y * view.step_y);
     float columns[LANES];
     for (int lane = 0; lane < LANES; ++lane) columns[lane] = view.left + (first_x + lane) * view.step_x;
     x = load_lanes(columns);
     for (int row = 0; row < BUFFER_ROWS; ++row) {
-        float rs[LANES], fs[LANES], maps[LANES], slacks[LANES];
+        float rs[LANES], fs[LANES], maps[LANES], slacks[LANES], bares_x[LANES], bares_y[LANES];
         for (int lane = 0; lane < LANES; ++lane) {
             const int at = min(first_y + row, view.height - 1) * view.width + min(first_x + lane, view.width - 1);
             // Where no receiver is anywhere near nobody looks.
             fs[lane] = nearest[at] == 0 ? 0.0f : as_float(furthest[at]);
             maps[lane] = texels[at].x;
+            const int2 away = view.two_sided ? bare[at] : (int2)(0);
+            bares_x[lane] = columns[lane] + away.x * view.step_x;
+            bares_y[lane] = view.top - (first_y + row + away.y) * view.step_y;
             const bool covered = maps[lane] > fs[lane] * (1.0f + 0x1p-10f);
             rs[lane] = covered ? as_float(nearest[at]) : fs[lane];
             // A texel that the map leaves bare is outside, though edges rounded, or rendered elsewhere, may miss it by up to a texel.
             slacks[lane] = covered ? 0.0f : fmax(view.step_x, view.step_y);
         }
         slack[row] = load_lanes(slacks);
+        open_x[row] = load_lanes(bares_x);
+        open_y[row] = load_lanes(bares_y);
+        const floatn away_x = open_x[row] - x, away_y = open_y[row] - (floatn)(view.top - (first_y + row) * view.step_y);
+        least_inner[row] = sqrt(fma(away_x, away_x, away_y * away_y)) - half_diagonal;
         r[row] = load_lanes(rs);
         behind[row] = load_lanes(fs);
         map[row] = load_lanes(maps);
@@ -192,11 +249,10 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
                     distance[row] = select_lanes(distance[row], n.distance, kept);
                     depth[row] = select_lanes(depth[row], n.b, kept);
                     if (!view.two_sided) continue;
-                    // Under a blocker, where light gets past the silhouette to the furthest receiver: what the map shows beside it does not hide that.
+                    // Under a blocker, where light gets past the outline to the furthest receiver: where that is nearest. Other edges lie inside it.
                     const floatn full = WIDTH_OF(view, n.b, behind[row]);
-                    intn within = (map[row] > behind[row] * (1.0f + 0x1p-10f)) & (n.distance < share[row] * full);
-                    if (NONE(within)) continue;
-                    within &= beside(view, n, texels) <= behind[row] * (1.0f + 0x1p-10f);
+                    const intn within = (map[row] > behind[row] * (1.0f + 0x1p-10f)) & (n.distance < share[row] * full) &
+                                        (fabs(n.x - open_x[row]) <= (floatn)(around)) & (fabs(n.y - open_y[row]) <= (floatn)(around));
                     share[row] = select_lanes(share[row], n.distance / full, within);
                     inner[row] = select_lanes(inner[row], n.distance, within);
                     inner_depth[row] = select_lanes(inner_depth[row], n.b, within);
@@ -210,8 +266,21 @@ __kernel void smoothie_buffer(const SmoothieView view, __global const float* res
         store_texels(distances + at, distance[row], left);
         store_texels(depths + at, depth[row], left);
         if (!view.two_sided) continue;
-        store_texels(inner_distances + at, inner[row], left);
-        store_texels(inner_depths + at, inner_depth[row], left);
+        float inners[LANES], inner_ds[LANES], shown[LANES], hidden[LANES];
+        const floatn away = least_inner[row] + half_diagonal, least_away = select_lanes(inner[row], least_inner[row], (inner[row] >= zero) & (inner[row] < least_inner[row]));
+        store_lanes(select_lanes(least_away, away, least_away > away), inners);
+        store_lanes(inner_depth[row], inner_ds);
+        store_lanes(map[row], shown);
+        store_lanes(behind[row], hidden);
+        for (int lane = 0; lane < LANES && lane < left; ++lane) {
+            if (inners[lane] < 0.0f && shown[lane] > hidden[lane] * (1.0f + 0x1p-10f) && bare[at + lane].x != 2 * view.width) {
+                const float2 own = inner_of_map(view, texels, first_x + lane, first_y + row, bare[at + lane]);
+                inners[lane] = own.y > 0.0f && own.x < WIDTH_OF(view, own.y, hidden[lane]) ? own.x : -1.0f;
+                inner_ds[lane] = own.y;
+            }
+            inner_distances[at + lane] = inners[lane];
+            inner_depths[at + lane] = inner_ds[lane];
+        }
     }
 }
 

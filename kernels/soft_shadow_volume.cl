@@ -25,31 +25,7 @@
 #include "common/stop.clh"
 #include "coverage_table.cl"
 
-// LANES receivers.
-typedef struct {
-    floatn tx, ty, d;
-} Receivers;
-
-// The light's centre as seen along a receiver's line past a vertex: X = x - t z. The light-space origin of the plane through the vertex.
-inline floatn across(const float coordinate, const float z, const floatn t) { return fma((floatn)(-z), t, (floatn)(coordinate)); }
-
-// Whether the light's centre lies left of the line from a to b, both as `across` gives them; all ones where it does. One expression for triangles and for
-// silhouettes, always from the vertex of the lower number to the other, so that both decide alike to the last bit. A centre on the line is moved by
-// (e, e^2) for an e that is as small as need be: no point is on two sides, or on none.
-inline intn left_of(const floatn ax, const floatn ay, const floatn bx, const floatn by)
-{
-    const floatn area = fma(ax, by, -(bx * ay));
-    const floatn zero = (floatn)(0.0f);
-    intn left = area > zero;
-    const intn on = area == zero;
-#if LANES == 1
-    if (on) left = ay > by || (ay == by && bx > ax);
-#else
-    if (!NONE(on)) left |= on & ((ay > by) | ((ay == by) & (bx > ax)));
-#endif
-    return left;
-}
-
+#include "common/wedge_receivers.clh"
 #include "common/wedge_culling.clh"
 
 // --- The share of the light beyond an edge ----------------------------------------------------------------------------------------------
@@ -104,38 +80,51 @@ __attribute__((always_inline)) inline void shares_beyond(floatn* shares, const E
 
 // --- Shading ------------------------------------------------------------------------------------------------------------------------------
 
-__attribute__((always_inline)) inline Receivers receivers_at(const WedgeLight light, const int stride, __global const float* xi, __global const float* eta, __global const float* d,
-                              const int x, const int y)
+// A triangle as the part of the light sees it: its vertices in order of their numbers; the plane's disparity 1 / z = n.x t.x + n.y t.y + n.z.
+typedef struct {
+    float ax, ay, az, bx, by, bz, cx, cy, cz, nx, ny, nz;
+    float moved;      // by how much more its plane is off for being moved from the whole light's centre to the part's: 0 where both are one
+    float from_whole; // the same of places, in tangents a disparity
+    bool turned;      // a, b, c turn clockwise, seen from the part's centre
+} Triangle;
+
+// Row of 16 floats, from the whole light's centre: the vertices, the plane N . p = D.
+inline Triangle triangle_of(__global const float* row, const bool turned, const WedgeLight light)
 {
-    const int at = y * stride + x;
-    Receivers p;
-    p.d = load_lanes(d + at) * light.scale_d;
-    // Seen from the part's centre instead of the whole light's: t' = (p - c) / p.z.
-    p.tx = fma((floatn)(-light.centre_x), p.d, load_lanes(xi + at) * light.scale_x);
-    p.ty = fma((floatn)(-light.centre_y), p.d, load_lanes(eta + at) * light.scale_y);
-    return p;
+    const float x = light.centre_x, y = light.centre_y;
+    Triangle t = {row[0] - x, row[1] - y, row[2], row[3] - x, row[4] - y, row[5], row[6] - x, row[7] - y, row[8], 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, turned};
+    const float d = fma(-row[9], x, fma(-row[10], y, row[12]));
+    const float nx = row[9] / d, ny = row[10] / d, nz = row[11] / d;
+    // Edge-on to the part's centre it covers nothing: a plane of disparity 0 is before nothing.
+    if (fabs(nx) < 1e18f && fabs(ny) < 1e18f && fabs(nz) < 1e18f) {
+        t.nx = nx;
+        t.ny = ny;
+        t.nz = nz;
+        t.moved = fabs(nx * x) + fabs(ny * y);
+    }
+    t.from_whole = 0x1p-23f * (fabs(x) + fabs(y));
+    return t;
 }
 
-// Where a triangle lies between the receivers and the light's centre. Row of 16 floats: the vertices a, b, c in order of their numbers; the plane's disparity
-// 1 / z = n.x t.x + n.y t.y + n.z; 1 where a, b, c turn counter-clockwise, seen from the light, else -1.
-__attribute__((always_inline)) inline intn behind_triangle(__global const float* triangle, const WedgeLight light, const Receivers p)
+// Where it lies between the receivers and the light's centre.
+__attribute__((always_inline)) inline intn behind_triangle(const Triangle t, const WedgeLight light, const Receivers p)
 {
-    const float nx = triangle[9], ny = triangle[10], nz = triangle[11];
     // Nearer to the light than the receiver by more than rounding and bias explain: of the plane's three terms, of the receiver's place, and of its depth.
-    const floatn near = fma((floatn)(nx), p.tx, fma((floatn)(ny), p.ty, (floatn)(nz)));
-    const floatn place = fma((floatn)(light.position_error), p.d, 0x1p-22f * (fabs(p.tx) + fabs(p.ty)));
-    const floatn rounding = 0x1p-22f * (fabs(nx) * fabs(p.tx) + fabs(ny) * fabs(p.ty) + fabs(nz)) + (fabs(nx) + fabs(ny)) * place;
-    const floatn limit = p.d + ((0x1p-22f + 2.0f * light.precision) * p.d + rounding + (fabs(nx) * light.bias_x + fabs(ny) * light.bias_y));
+    const floatn near = fma((floatn)(t.nx), p.tx, fma((floatn)(t.ny), p.ty, (floatn)(t.nz)));
+    const floatn place = fma((floatn)(light.position_error + t.from_whole), p.d, 0x1p-22f * (fabs(p.tx) + fabs(p.ty)));
+    const floatn rounding = 0x1p-22f * (fabs(t.nx) * fabs(p.tx) + fabs(t.ny) * fabs(p.ty) + fabs(t.nz)) + (fabs(t.nx) + fabs(t.ny)) * place;
+    const floatn own = fma((floatn)(0x1p-23f * t.moved), fabs(near), rounding);
+    const floatn limit = p.d + ((0x1p-22f + 2.0f * light.precision) * p.d + own + (fabs(t.nx) * light.bias_x + fabs(t.ny) * light.bias_y));
     const intn before = near > limit;
     if (NONE(before)) return before;
-    const floatn ax = across(triangle[0], triangle[2], p.tx), ay = across(triangle[1], triangle[2], p.ty);
-    const floatn bx = across(triangle[3], triangle[5], p.tx), by = across(triangle[4], triangle[5], p.ty);
-    const floatn cx = across(triangle[6], triangle[8], p.tx), cy = across(triangle[7], triangle[8], p.ty);
+    const floatn ax = across(t.ax, t.az, p.tx), ay = across(t.ay, t.az, p.ty);
+    const floatn bx = across(t.bx, t.bz, p.tx), by = across(t.by, t.bz, p.ty);
+    const floatn cx = across(t.cx, t.cz, p.tx), cy = across(t.cy, t.cz, p.ty);
     const intn ab = left_of(ax, ay, bx, by), bc = left_of(bx, by, cx, cy), ac = left_of(ax, ay, cx, cy);
 #if LANES == 1
-    return triangle[12] > 0.0f ? ab && bc && !ac : !ab && !bc && ac;
+    return t.turned ? !ab && !bc && ac : ab && bc && !ac;
 #else
-    return before & (triangle[12] > 0.0f ? ab & bc & ~ac : ~ab & ~bc & ac);
+    return before & (t.turned ? ~ab & ~bc & ac : ab & bc & ~ac);
 #endif
 }
 
@@ -179,18 +168,6 @@ inline uint chosen(const Tile tile, __global const float* boxes, const int culli
     return below & above & (culling == CULLING_NONE ? 0xffffu : bits_of(boxes_meet(tile, boxes, use_reach)));
 }
 
-// Between which tangents y a row's receivers lie. Without one: nowhere.
-inline float2 span_of(const Receivers p)
-{
-    float y[LANES], d[LANES];
-    store_lanes(p.ty, y);
-    store_lanes(p.d, d);
-    float2 span = (float2)(0x1p60f, -0x1p60f);
-    for (int lane = 0; lane < LANES; ++lane)
-        if (d[lane] < 0x1p120f) span = (float2)(fmin(span.x, y[lane]), fmax(span.y, y[lane]));
-    return span;
-}
-
 // What a sheet adds to the occlusion of those before it, overlap sum. Of a surface that is not closed both sides hide, yet what they hide is mostly the same
 // light: the side that hides more counts, and the first one's occlusion waits for the other's in `first` (0 where the tile does not see it: no edge's share
 // and no triangle counts there).
@@ -213,27 +190,14 @@ inline floatn joined(const floatn before, const floatn sheet, const int overlap)
     return fma(-before, one, before + one);
 }
 
-inline void write_visibility(__global float* to, const floatn seen, const int left, const int add)
-{
-#if CHANNELS == 1
-    if (left >= LANES) {
-        store_lanes(add ? load_lanes(to) + seen : seen, to);
-        return;
-    }
-#endif
-    float lanes[LANES];
-    store_lanes(seen, lanes);
-    const int count = left < LANES ? left : LANES;
-    for (int lane = 0; lane < count; ++lane) to[lane * CHANNELS] = add ? to[lane * CHANNELS] + lanes[lane] : lanes[lane];
-}
-
 // soft_shadow_volume: one light, or one part of it.
 //
 //   sheet_boxes, edge_boxes, triangle_boxes   boxes (boxes_meet) of sheets, and of groups of WEDGE_GROUP edges or triangles; blocks of 16 boxes
 //   edge_ends [groups][6][16]                 ends of edges (edges_meet)
 //   edges [groups][16][8]                     Edge, and padding
-//   triangle_extents [groups][5][16]          boxes of single triangles
-//   triangles [groups][16][16]                behind_triangle
+//   triangle_groups [groups]                  a group of triangles; which of them face the part, and 16 bits up, turn clockwise
+//   triangle_extents [groups][6][16]          boxes of single triangles, from the whole light's centre: triangles_meet
+//   triangles [groups][16][16]                triangle_of
 //   visibility [height][width][CHANNELS]      share of the light that is seen, 0 to 1
 //   coverage, coverage_size                   linear: the wedges' planes; texture: the table and its n; else nothing
 //   evaluated [tiles][2]                      edges, and triangles, that were evaluated against the tile's receivers; added to with further parts
@@ -246,7 +210,8 @@ inline void write_visibility(__global float* to, const floatn seen, const int le
 __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light, const float4 eye, __global const Sheet* restrict sheets,
                                  __global const float* restrict sheet_boxes, __global const float* restrict edge_boxes,
                                  __global const float* restrict edge_ends, __global const float* restrict edges, __global const float* restrict triangle_boxes,
-                                 __global const float* restrict triangle_extents, __global const float* restrict triangles,
+                                 __global const int2* restrict triangle_groups, __global const float* restrict triangle_extents,
+                                 __global const float* restrict triangles,
                                  __global const float8* restrict bounds, __global const float* restrict xi, __global const float* restrict eta,
                                  __global const float* restrict d, __global float* restrict visibility, __global uint2* restrict evaluated, __global const float* restrict coverage,
                                  const int coverage_size, __global const volatile int* stop)
@@ -256,6 +221,7 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
     const int number = (y / TILE_ROWS) * (view.stride / TILE_WIDTH) + x / TILE_WIDTH;
     const bool empty = bounds[number].s6 == 0.0f;
     const Tile tile = tile_of(bounds[number], light, eye);
+    const float2 centre = (float2)(light.centre_x, light.centre_y);
 
     floatn occlusion[CHANNELS][ITEM_ROWS];
     for (int channel = 0; channel < CHANNELS; ++channel)
@@ -275,18 +241,21 @@ __kernel void soft_shadow_volume(const ReceiverView view, const WedgeLight light
             for (int channel = 0; channel < CHANNELS; ++channel)
                 for (int row = 0; row < ITEM_ROWS; ++row) clear(&sums[channel][row]);
 
+            // Pairs of a group and of which of its triangles face the part.
             for (int groups = sheet.triangles_begin & ~15; groups < sheet.triangles_end; groups += 16) {
                 if (stopped(stop)) return;
                 uint group_bits = chosen(tile, triangle_boxes + groups * 5, light.culling, 0.0f, sheet.triangles_begin - groups, sheet.triangles_end - groups);
                 while (group_bits) {
-                    const int group = groups + take_bit(&group_bits);
-                    uint bits = chosen(tile, triangle_extents + group * 80, light.culling, 0.0f, 0, 16);
+                    const int2 pair = triangle_groups[groups + take_bit(&group_bits)];
+                    __global const float* const extents = triangle_extents + pair.x * 96;
+                    uint bits = (uint)pair.y & 0xffffu & (light.culling == CULLING_NONE ? 0xffffu : bits_of(triangles_meet(tile, extents, centre)));
                     while (bits) {
                         const int i = take_bit(&bits);
-                        __global const float* triangle = triangles + (group * 16 + i) * 16;
+                        const Triangle triangle = triangle_of(triangles + (pair.x * 16 + i) * 16, (pair.y >> (16 + i)) & 1, light);
                         // Triangles are often smaller than a tile: only rows that they reach.
-                        const float low = triangle_extents[group * 80 + 32 + i], high = triangle_extents[group * 80 + 48 + i];
-                        const float margin = 0x1p-18f * (fabs(low) + fabs(high));
+                        const float2 move = moved_by(light.centre_y, extents[64 + i], extents[80 + i]);
+                        const float low = extents[32 + i] - move.y, high = extents[48 + i] - move.x;
+                        const float margin = 0x1p-18f * (fabs(low) + fabs(high) + fabs(move.x) + fabs(move.y));
                         ++count.y;
                         for (int row = 0; row < ITEM_ROWS; ++row)
                             if (light.culling == CULLING_NONE || (high + margin >= spans[row].x && low - margin <= spans[row].y)) {

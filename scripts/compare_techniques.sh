@@ -61,8 +61,8 @@ rays ray_traced samples=64
 soft_shadow_map soft_shadow_map
 soft_shadow_volume soft_shadow_volume
 occlusion_texture occlusion_texture
-smoothie smoothie
-smoothie_two_sided smoothie two_sided=true
+smoothie smoothie two_sided=false
+smoothie_two_sided smoothie
 shadow_map shadow_map
 END
 

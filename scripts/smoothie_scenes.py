@@ -41,7 +41,7 @@ def pinhole(eye, target, degrees):
     return {"kind": "pinhole", "eye": eye, "target": target, "up": [0, 1, 0], "vertical_fov_deg": degrees}
 
 
-SMOOTHIE = {"smoothie": {"kind": "smoothie"}, "two_sided": {"kind": "smoothie", "two_sided": True}, "rays": {"kind": "ray_traced", "samples": 256}}
+SMOOTHIE = {"smoothie": {"kind": "smoothie", "two_sided": False}, "two_sided": {"kind": "smoothie"}, "rays": {"kind": "ray_traced", "samples": 256}}
 
 cylinder("cylinder.obj")
 box("high.obj", (-0.7, 2.2, -0.5), (0.5, 2.5, 0.7))
@@ -52,7 +52,7 @@ box("right.obj", (-0.1, 1.4, -1.6), (2, 1.6, 0.3))
 down = [-4, -7, -2]
 for texels in (256, 512, 1024):
     for name, technique in (("1_hard", {"kind": "shadow_map"}), ("2_bicubic", {"kind": "shadow_map", "filter": "bicubic"}),
-                            ("3_small", {"kind": "smoothie", "t_from": "t", "t": 0.05}), ("4_large", {"kind": "smoothie", "t_from": "t", "t": 0.2})):
+                            ("3_small", {"kind": "smoothie", "two_sided": False, "t_from": "t", "t": 0.05}), ("4_large", {"kind": "smoothie", "two_sided": False, "t_from": "t", "t": 0.2})):
         scene("resolution_%04d_%s.json" % (texels, name), ["cylinder.obj"], sphere([4, 7, 2], 0.1, down), texels, technique,
               pinhole([-1.9, 4.2, 1.6], [-1.15, 0, -0.3], 32), 320)
 for radius in (0.1, 0.4, 0.8):

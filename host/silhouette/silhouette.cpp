@@ -111,6 +111,7 @@ std::vector<std::uint32_t> list_sheets(const Topology& topology, const Surface& 
         const Triangle& t = surface.triangles[i];
         silhouette.facing.push_back(surface.turned(i) ? Triangle{t[0], t[2], t[1]} : t);
     }
+    silhouette.facing_numbers = std::move(reached);
     return sheet_of;
 }
 

@@ -81,6 +81,7 @@ struct SheetSide {
 struct Silhouette {
     // Triangles that face the point, wound counter-clockwise seen from it; those of one sheet beside each other.
     std::vector<std::array<std::uint32_t, 3>> facing;
+    std::vector<std::uint32_t> facing_numbers; // of each, in the topology
     std::vector<std::uint32_t> facing_begin; // sheet s has facing [facing_begin[s], facing_begin[s + 1])
     std::vector<SheetSide> sides;            // of each sheet
 

@@ -130,6 +130,21 @@ ReceiverDepths receiver_depths(opencl::Work& work, const PreparedSmoothie& prepa
     return depths;
 }
 
+// Of each texel where the nearest is that hides nothing; nothing where no fin goes inwards.
+opencl::Buffer<cl_int2> bare_places(opencl::Work& work, const PreparedSmoothie& prepared, const ReceiverDepths& receivers)
+{
+    const SmoothieView& view = prepared.view;
+    if (!view.two_sided) return work.buffer<cl_int2>(1, "bare texels");
+    const std::size_t width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height), count = width * height;
+    const cl_int2 size{{view.width, view.height}};
+    const auto in_row = work.buffer<cl_int>(count, "bare texels in rows");
+    auto places = work.buffer<cl_int2>(count, "bare texels");
+    work.launch(prepared.program, "bare_in_row", {width, height}, {16, 8}, count * 24, size, prepared.map.texels, receivers.nearest, receivers.furthest,
+                in_row);
+    work.launch(prepared.program, "bare_place", {width, height}, {16, 8}, count * 16, size, cl_float2{{view.step_x, view.step_y}}, in_row, places);
+    return places;
+}
+
 // The light's centre; of a directional light a point so far against its direction that its rays are parallel to a ten-thousandth.
 Vec3 viewpoint(const LightFrame& frame, const Camera& camera, const Topology& topology)
 {
@@ -183,7 +198,7 @@ TechniqueRow row(const Smoothie&)
                                "edges of the objects that cast, or of the depth map; without objects: of the map"),
                  choice_key<S>("falloff", &S::falloff, falloff_names, "of visibility across a smoothie"),
                  flag_key<S>("two_sided", &S::two_sided,
-                             "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks"),
+                             "a smoothie on either side of the silhouette, half lit on it, so that the umbra shrinks; false: the paper's, outwards alone"),
                  real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
                              "self-shadow bound from the surface's slope; 1 is the bound, 0 none"),
                  tolerance_key<S>()},
@@ -264,10 +279,11 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     const std::size_t lanes = static_cast<std::size_t>(work.context().quirks().lanes);
     const SmoothieGrid grid_of_texels{.lanes = static_cast<int>(lanes), .columns = static_cast<int>((width + lanes - 1) / lanes), .rows = static_cast<int>((height + SmoothieGrid::item_rows - 1) / SmoothieGrid::item_rows)};
     const auto evaluated = work.buffer<cl_uint>(grid_of_texels.items(), "evaluated edges");
+    const auto bare = bare_places(work, prepared, depths_of);
     const auto search = [&](std::size_t rows) {
         work.launch(prepared.program, "smoothie_buffer", {static_cast<std::size_t>(grid_of_texels.columns), rows},
                     {lanes == 1 ? std::size_t{16} : std::size_t{1}, 1}, count * 24 + prepared.edges.bytes(), view, prepared.boxes,
-                    prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, fin_distances, depths,
+                    prepared.edge_boxes, prepared.edges, prepared.map.texels, depths_of.nearest, depths_of.furthest, bare, fin_distances, depths,
                     distances, inner_depths, evaluated, work.stop());
     };
     const auto all_rows = static_cast<std::size_t>(grid_of_texels.rows);

@@ -10,6 +10,7 @@
 #include "technique/coverage_table.hpp"
 #include "technique/keys.hpp"
 #include "technique/linear_wedges.hpp"
+#include "technique/receiver_silhouettes.hpp"
 #include "technique/work_estimate.hpp"
 
 namespace penumbra {
@@ -18,6 +19,7 @@ namespace {
 constexpr WorkKind shares{"technique.light_splits", WorkAmount::Unit::pairs, "pairs of edge and receiver"};
 
 constexpr Names<3> coverage_names{"linear", "analytic", "texture"};
+constexpr Names<2> silhouettes_names{"centre", "per_receiver"};
 constexpr Names<4> overlap_names{"sum", "max", "half_min", "product"};
 constexpr Names<3> lookup_names{"nearest", "bilinear", "quadrilinear"};
 constexpr Names<4> buffer_names{"binary32", "int16", "six_bits", "twelve_bits"};
@@ -35,10 +37,14 @@ const Image* emission_of(const Light& light)
 
 void check_settings(const Light& light, const SoftShadowVolume& settings)
 {
+    check_together(settings);
     const LightFrame frame = light_frame(light);
     const auto refuse = [&](const std::string& key, const std::string& what, const std::string& expected) {
         throw Error::at(ErrorCode::invalid_input, "technique." + key, what + " and the light a " + kind_of(light), expected);
     };
+    if (settings.silhouettes == Silhouettes::per_receiver && (frame.shape != LightShape::rectangle || emission_of(light)))
+        refuse("silhouettes", "is per_receiver", emission_of(light) ? "expected a light without emission, or silhouettes centre"
+                                                                    : "expected a rectangle or a point, or silhouettes centre");
     if (settings.light_splits > 1 && frame.shape != LightShape::rectangle)
         refuse("light_splits", "is " + std::to_string(settings.light_splits), "expected 1: only rectangles are split");
     if (settings.coverage == Coverage::texture && !std::holds_alternative<RectangleLight>(light))
@@ -65,6 +71,12 @@ opencl::Specialisation program(int lanes, LightShape light, const SoftShadowVolu
              {"CHANNELS", std::to_string(channels)},
              choice_constant("LOOKUP", lookup_names, table ? settings.lookup : Lookup::quadrilinear),
              choice_constant("ACCUMULATOR", buffer_names, settings.buffer)}};
+}
+
+opencl::Specialisation counting_program(int lanes)
+{
+    return {"soft_shadow_silhouettes.cl",
+            {{"LANES", std::to_string(lanes)}, {"ITEM_ROWS", std::to_string(item_rows(lanes))}, {"TILE_ROWS", std::to_string(tile_rows)}, {"CHANNELS", "1"}}};
 }
 
 // What the kernel culls by. Depth ranges are the host's affair.
@@ -102,9 +114,9 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
 // What of a part goes to the device.
 double bytes_of(const WedgeData& data)
 {
-    const std::size_t floats = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() +
-                               data.triangle_boxes.size() + data.triangle_extents.size() + data.triangles.size();
-    return static_cast<double>(floats) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
+    const std::size_t words = data.sheet_boxes.size() + data.edge_boxes.size() + data.edge_ends.size() + data.edges.size() +
+                              data.triangle_boxes.size() + data.triangle_groups.size();
+    return static_cast<double>(words) * sizeof(float) + static_cast<double>(data.sheets.size()) * sizeof(Sheet);
 }
 
 PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data, const WedgeLight& light)
@@ -120,8 +132,23 @@ PreparedSoftShadowVolume::Part upload(opencl::Work& work, const WedgeData& data,
             .edge_ends = floats(data.edge_ends, "ends of edges"),
             .edges = floats(data.edges, "edges"),
             .triangle_boxes = floats(data.triangle_boxes, "boxes of triangles"),
-            .triangle_extents = floats(data.triangle_extents, "extents of triangles"),
-            .triangles = floats(data.triangles, "triangles")};
+            .triangle_groups = work.upload(std::span<const cl_int>(data.triangle_groups), "facing triangles")};
+}
+
+PreparedSoftShadowVolume::Counted upload(opencl::Work& work, const ReceiverSilhouettes& data, const WedgeLight& light)
+{
+    const auto floats = [&](const std::vector<float>& values, const char* what) {
+        return work.upload(std::span<const float>(values), what);
+    };
+    return {.light = light,
+            .edges = {{data.edge_supers, data.edge_groups}},
+            .triangles = {{data.triangle_supers, data.triangle_groups}},
+            .edge_supers = floats(data.edge_super_boxes, "boxes of groups of edges"),
+            .edge_groups = floats(data.edge_group_boxes, "boxes of edges"),
+            .edge_sets = floats(data.edge_sets, "edges"),
+            .triangle_supers = floats(data.triangle_super_boxes, "boxes of groups of triangles"),
+            .triangle_groups = floats(data.triangle_group_boxes, "boxes of triangles"),
+            .triangle_sets = floats(data.triangle_sets, "triangles")};
 }
 
 // What the host finds out for a part.
@@ -131,7 +158,8 @@ struct PartWedges {
     std::size_t sheets = 0;
 };
 
-PartWedges wedges_of(const Topology& topology, const LightFrame& frame, const LightPart& part, const SoftShadowVolume& settings)
+PartWedges wedges_of(const Topology& topology, const WedgeTriangles& triangles, const LightFrame& frame, const LightPart& part,
+                     const SoftShadowVolume& settings)
 {
     const bool extent = frame.half_u > 0 || frame.half_v > 0;
     PartWedges wedges;
@@ -141,7 +169,7 @@ PartWedges wedges_of(const Topology& topology, const LightFrame& frame, const Li
         silhouette = wedges.linear.silhouette;
     }
     wedges.sheets = silhouette.sheets();
-    wedges.data = wedge_data(topology, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
+    wedges.data = wedge_data(topology, triangles, silhouette, frame, part, settings.overlap != Overlap::sum, extent);
     return wedges;
 }
 
@@ -257,6 +285,8 @@ TechniqueRow row(const SoftShadowVolume&)
             "Penumbra wedges: the hard shadow of the light's centre, corrected around each silhouette edge. Exact for planar casters.",
         .source = "Assarsson: A Real-Time Soft Shadow Volume Algorithm, 2003 (Papers I to V)",
         .keys = {preset_key<S>(paper_settings()),
+                 choice_key<S>("silhouettes", &S::silhouettes, silhouettes_names,
+                               "from the light's centre, or from each receiver, counted before 32 x 32 samples: what rays see (rectangle, point)"),
                  choice_key<S>("coverage", &S::coverage, coverage_names,
                                "an edge's share of the light: Paper I's wedge, the closed form, or a table, which textured lights need"),
                  flag_key<S>("smooth", &S::smooth, "linear: light intensity s becomes 3 s^2 - 2 s^3"),
@@ -298,20 +328,35 @@ PreparedSoftShadowVolume prepare_soft_shadow_volume(opencl::Work& work, const Li
     PreparedSoftShadowVolume prepared{.settings = settings,
                                       .channels = 1,
                                       .program = program(work.context().quirks().lanes, frame.shape, settings, 1),
+                                      .triangle_extents = {},
+                                      .triangle_rows = {},
                                       .parts = {},
+                                      .counted = {},
                                       .edges = 0,
                                       .triangles = 0,
                                       .sheets = 0,
                                       .warnings = {}};
+    if (extent && settings.silhouettes == Silhouettes::per_receiver) {
+        const LightPart corner = corner_part(frame);
+        const ReceiverSilhouettes data = receiver_silhouettes(casters.topology, frame, corner);
+        prepared.program = counting_program(work.context().quirks().lanes);
+        prepared.counted = upload(work, data, wedge_light(frame, corner, casters, settings, 0));
+        prepared.edges = data.edge_count;
+        prepared.triangles = data.triangle_count;
+        return prepared;
+    }
     const bool linear = extent && settings.coverage == Coverage::linear;
     std::uint64_t left_out = 0, unshared = 0;
     const std::vector<LightPart> parts = light_parts(frame, splits);
     // As many parts at a time as there are threads: the host never holds the wedges of all.
+    const WedgeTriangles triangles = wedge_triangles(casters.topology, frame, parts);
+    prepared.triangle_rows = work.upload(std::span<const float>(triangles.rows), "triangles");
+    prepared.triangle_extents = work.upload(std::span<const float>(triangles.extents), "extents of triangles");
     std::vector<PartWedges> batch(std::min<std::size_t>(thread_count(), parts.size()));
     for (std::size_t first = 0; first < parts.size(); first += batch.size()) {
         const std::size_t count = std::min(batch.size(), parts.size() - first);
         parallel_for(static_cast<int>(count), [&](int i) {
-            batch[static_cast<std::size_t>(i)] = wedges_of(casters.topology, frame, parts[first + static_cast<std::size_t>(i)], settings);
+            batch[static_cast<std::size_t>(i)] = wedges_of(casters.topology, triangles, frame, parts[first + static_cast<std::size_t>(i)], settings);
         });
         for (std::size_t i = 0; i < count; ++i) {
             const auto& [wedges, data, sheets] = batch[i];
@@ -368,22 +413,45 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
     // Of coordinates in the camera's frame, moved by the camera's place: a few roundings of it.
     const float place = 0x1p-22F * std::max({std::abs(view.light_from_camera[3]), std::abs(view.light_from_camera[7]),
                                              std::abs(view.light_from_camera[11])});
-    for (std::size_t i = 0; i < prepared.parts.size(); ++i) {
-        const PreparedSoftShadowVolume::Part& part = prepared.parts[i];
-        WedgeLight light = part.light;
-        light.first = i == 0;
+    const auto seen_by = [&](WedgeLight light) {
         light.precision = static_cast<float>(receivers.precision);
         light.position_error = place * std::max(light.scale_x, light.scale_y) / light.scale_d;
+        return light;
+    };
+    if (const auto& counted = prepared.counted)
+        work.launch(prepared.program, "soft_shadow_silhouettes", {width / lanes, height / rows}, group,
+                    width * height * 16 + counted->edge_sets.bytes() + counted->triangle_sets.bytes(), view, seen_by(counted->light), counted->edges,
+                    counted->triangles, counted->edge_supers, counted->edge_groups, counted->edge_sets, counted->triangle_supers,
+                    counted->triangle_groups, counted->triangle_sets, bounds, receivers.xi, receivers.eta, receivers.d, visibility, evaluated,
+                    work.stop());
+    for (std::size_t i = 0; i < prepared.parts.size(); ++i) {
+        const PreparedSoftShadowVolume::Part& part = prepared.parts[i];
+        WedgeLight light = seen_by(part.light);
+        light.first = i == 0;
         work.launch(prepared.program, "soft_shadow_volume", {width / lanes, height / rows}, group,
-                    width * height * 16 + part.triangles.bytes() + part.edges.bytes(), view, light,
+                    width * height * 16 + prepared.triangle_rows.bytes() + part.edges.bytes(), view, light,
                     eye_of(view, light, prepared.settings.culling == WedgeCulling::far_depth), part.sheets, part.sheet_boxes,
-                    part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_extents, part.triangles, bounds,
+                    part.edge_boxes, part.edge_ends, part.edges, part.triangle_boxes, part.triangle_groups,
+                    prepared.triangle_extents, prepared.triangle_rows, bounds,
                     receivers.xi, receivers.eta, receivers.d, visibility, evaluated, part.coverage,
                     static_cast<cl_int>(prepared.settings.table), work.stop());
     }
     if (!counts) return;
     for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
     for (const cl_uint2& tile : work.read(evaluated)) counts->pairs += std::uint64_t{tile.s[0]} * TILE_WIDTH * tile_rows;
+}
+
+void check_together(const SoftShadowVolume& settings)
+{
+    if (settings.silhouettes == Silhouettes::centre) return;
+    const auto refuse = [](const std::string& key, const std::string& value, const std::string& expected) {
+        throw Error::at(ErrorCode::invalid_input, "technique." + key, "is " + value + " and silhouettes per_receiver", "expected " + expected + ", or silhouettes centre");
+    };
+    const SoftShadowVolume usual;
+    if (settings.coverage != usual.coverage) refuse("coverage", std::string(coverage_names[static_cast<std::size_t>(settings.coverage)]), "analytic");
+    if (settings.overlap != usual.overlap) refuse("overlap", std::string(overlap_names[static_cast<std::size_t>(settings.overlap)]), "sum: samples are counted, sheets are not joined");
+    if (settings.buffer != usual.buffer) refuse("buffer", std::string(buffer_names[static_cast<std::size_t>(settings.buffer)]), "binary32");
+    if (settings.light_splits != usual.light_splits) refuse("light_splits", std::to_string(settings.light_splits), "1: no silhouette stands for another");
 }
 
 Needs needs(const SoftShadowVolume&) { return {.casters = Needs::Casters::or_front}; }
@@ -432,6 +500,7 @@ std::vector<WorkAmount> work(const SoftShadowVolume& settings, const MaskShape& 
 
 std::vector<opencl::Specialisation> specialisations(const SoftShadowVolume& settings, int lanes)
 {
+    if (settings.silhouettes == Silhouettes::per_receiver) return {counting_program(lanes), program(lanes, LightShape::rectangle, settings, 1)};
     // Tables are of rectangles, in one channel or three.
     if (settings.coverage == Coverage::texture)
         return {program(lanes, LightShape::rectangle, settings, 1), program(lanes, LightShape::rectangle, settings, 3)};

@@ -1,6 +1,7 @@
 // Soft Shadow Volumes (Assarsson 2003): settings become device state, device state becomes masks.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,21 @@ struct PreparedSoftShadowVolume {
         WedgeLight light{};
         opencl::Buffer<Sheet> sheets;
         opencl::Buffer<float> coverage; // texture: the table; linear: the planes of wedges; else none
-        opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes, triangle_extents, triangles;
+        opencl::Buffer<float> sheet_boxes, edge_boxes, edge_ends, edges, triangle_boxes;
+        opencl::Buffer<cl_int> triangle_groups;
+    };
+    // What silhouettes from each receiver need.
+    struct Counted {
+        WedgeLight light{};
+        cl_int2 edges{}, triangles{}; // groups of groups, groups
+        opencl::Buffer<float> edge_supers, edge_groups, edge_sets, triangle_supers, triangle_groups, triangle_sets;
     };
     SoftShadowVolume settings;
     int channels = 1; // of the visibility: 3 for a coloured texture
     opencl::Specialisation program;
+    opencl::Buffer<float> triangle_extents, triangle_rows; // of all parts
     std::vector<Part> parts;
+    std::optional<Counted> counted; // instead of parts
     std::uint64_t edges = 0, triangles = 0, sheets = 0; // of all parts
     std::vector<std::string> warnings;
 };
@@ -49,6 +59,7 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
 // The verbs (verbs.hpp).
 TechniqueRow row(const SoftShadowVolume&);
 Needs needs(const SoftShadowVolume&);
+void check_together(const SoftShadowVolume& settings);
 PreparedSoftShadowVolume prepare(opencl::Work& work, const Casting& casting, const SoftShadowVolume& settings, Findings& findings);
 void shade(opencl::Work& work, const PreparedSoftShadowVolume& prepared, const Receiving& receivers, Shaded& shaded);
 std::vector<WorkAmount> work(const SoftShadowVolume& settings, const MaskShape& shape);

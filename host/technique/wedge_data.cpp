@@ -6,7 +6,10 @@
 #include <numeric>
 #include <unordered_map>
 
+#include <penumbra/error.hpp>
+
 #include "scene/stop.hpp"
+#include "technique/spatial_order.hpp"
 
 namespace penumbra {
 namespace {
@@ -75,7 +78,8 @@ std::vector<float> blocks(const std::vector<Box>& boxes)
 
 class Builder {
 public:
-    Builder(const Topology& topology, const LightFrame& light, const LightPart& part) : any_plane_(light.shape == LightShape::disc)
+    Builder(const Topology& topology, const WedgeTriangles& triangles, const LightFrame& light, const LightPart& part)
+        : any_plane_(light.shape == LightShape::disc), part_(part), triangles_(triangles), faces_(triangles.boxes.size(), 0)
     {
         points_.reserve(topology.vertices().size());
         places_.reserve(topology.vertices().size());
@@ -115,18 +119,31 @@ public:
             add_edge_group(all, std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
     }
 
-    void add_triangles(std::span<const std::array<std::uint32_t, 3>> triangles)
+    // Facing triangles, wound counter-clockwise as the part's centre sees them, and their numbers.
+    void add_triangles(std::span<const std::array<std::uint32_t, 3>> triangles, std::span<const std::uint32_t> numbers)
     {
-        std::vector<std::array<std::uint32_t, 3>> counted;
-        for (const auto& triangle : triangles)
-            if (counts(triangle[0]) || counts(triangle[1]) || counts(triangle[2])) counted.push_back(triangle);
-        data_.triangle_count += counted.size();
-        sort_by_place(counted);
-        const std::size_t groups = (counted.size() + group_size - 1) / group_size;
-        data_.triangles.reserve(data_.triangles.size() + 16 * group_size * groups);
-        data_.triangle_extents.reserve(data_.triangle_extents.size() + 5 * group_size * groups);
-        for (std::size_t first = 0; first < counted.size(); first += group_size)
-            add_triangle_group(std::span(counted).subspan(first, std::min(group_size, counted.size() - first)));
+        for (std::size_t i = 0; i < triangles.size(); ++i) {
+            const auto& [a, b, c] = triangles[i];
+            if (!counts(a) && !counts(b) && !counts(c)) continue;
+            const std::uint32_t row = triangles_.rows_of[numbers[i]];
+            if (row == no_edge) throw Error(ErrorCode::internal, "a triangle faces a part of the light and no corner of it", "please report this");
+            // Sorting turns it round with each exchange: an odd permutation.
+            const bool turned = (a > b) != ((b > c) != (a > c));
+            const std::uint32_t bit = row % group_size;
+            std::uint32_t& faces = faces_[row / group_size];
+            if (faces == 0) touched_.push_back(row / group_size);
+            faces |= (1U | (turned ? 0x10000U : 0U)) << bit;
+            ++data_.triangle_count;
+        }
+        std::sort(touched_.begin(), touched_.end());
+        for (const std::uint32_t group : touched_) {
+            const Box box = box_of_part(triangles_.boxes[group]);
+            triangle_groups_.push_back(box);
+            sheet_box_.add(box);
+            data_.triangle_groups.insert(data_.triangle_groups.end(), {static_cast<int>(group), static_cast<int>(faces_[group])});
+            faces_[group] = 0;
+        }
+        touched_.clear();
     }
 
     WedgeData take()
@@ -140,32 +157,17 @@ public:
 private:
     bool counts(std::uint32_t vertex) const { return any_plane_ || points_[vertex].z > 0; }
 
-    // Along a Z curve over the light's view, so that a group's box is small.
-    void sort_by_place(std::vector<std::array<std::uint32_t, 3>>& triangles) const
+    // Where a box lies as the part's centre sees it.
+    Box box_of_part(const WedgeTriangles::Box& box) const
     {
-        Box all;
-        for (const auto& triangle : triangles)
-            if (places_[triangle[0]].near > 0) all.add(places_[triangle[0]]);
-        const auto cell = [](double value, double low, double high) {
-            const double place = high > low ? (value - low) / (high - low) : 0;
-            std::uint32_t v = static_cast<std::uint32_t>(std::clamp(place, 0.0, 1.0) * 65535);
-            v = (v | v << 8) & 0x00ff00ffU;
-            v = (v | v << 4) & 0x0f0f0f0fU;
-            v = (v | v << 2) & 0x33333333U;
-            return (v | v << 1) & 0x55555555U;
-        };
-        std::vector<std::uint64_t> order; // code, then the triangle's number
-        order.reserve(triangles.size());
-        for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-            const Place& place = places_[triangles[i][0]];
-            const std::uint32_t code = cell(place.x, all.low[0], all.high[0]) | cell(place.y, all.low[1], all.high[1]) << 1;
-            order.push_back(std::uint64_t{place.near > 0 ? code : 0} << 32 | i);
-        }
-        std::sort(order.begin(), order.end());
-        std::vector<std::array<std::uint32_t, 3>> sorted;
-        sorted.reserve(triangles.size());
-        for (const std::uint64_t entry : order) sorted.push_back(triangles[entry & 0xffffffffU]);
-        triangles = std::move(sorted);
+        const auto move = [&box](double centre) { return std::minmax({centre * box.far, centre * box.near}); };
+        const auto [x0, x1] = move(part_.centre_x);
+        const auto [y0, y1] = move(part_.centre_y);
+        Box moved;
+        moved.low = {box.low_x - x1, box.low_y - y1};
+        moved.high = {box.high_x - x0, box.high_y - y0};
+        moved.near = box.near;
+        return moved;
     }
 
     void add_edge_group(std::span<const SilhouetteEdge> all, std::span<const std::uint32_t> numbers)
@@ -203,56 +205,10 @@ private:
         sheet_box_.add(box);
     }
 
-    void add_triangle_group(std::span<const std::array<std::uint32_t, 3>> triangles)
-    {
-        const std::size_t rows = data_.triangles.size();
-        data_.triangles.resize(rows + 16 * group_size, 0.0F); // a plane of disparity 0 is before nothing
-        const std::size_t extents = data_.triangle_extents.size();
-        data_.triangle_extents.resize(extents + 5 * group_size, -1.0F);
-        Box box;
-        for (std::size_t i = 0; i < triangles.size(); ++i) {
-            if (i % 1024 == 0) check_stop();
-            std::array<std::uint32_t, 3> order = triangles[i];
-            // Seen from the light they turn counter-clockwise; sorting turns them round with each exchange.
-            bool turned = false;
-            const auto exchange = [&](std::size_t j, std::size_t k) {
-                if (order[j] > order[k]) {
-                    std::swap(order[j], order[k]);
-                    turned = !turned;
-                }
-            };
-            exchange(0, 1);
-            exchange(1, 2);
-            exchange(0, 1);
-            const Vec3 &a = points_[order[0]], &b = points_[order[1]], &c = points_[order[2]];
-            const Vec3 normal = (b - a).cross(c - a), plane = normal / normal.dot(a);
-            Box own;
-            for (const std::uint32_t vertex : order) own.add(places_[vertex]);
-            write_box(data_.triangle_extents.data() + extents + i, own);
-            box.add(own);
-            // Edge-on to the light's centre it covers nothing.
-            const bool flat = !(std::abs(plane.x) < everywhere && std::abs(plane.y) < everywhere && std::abs(plane.z) < everywhere);
-            const std::array<double, 13> values{a.x,
-                                                a.y,
-                                                a.z,
-                                                b.x,
-                                                b.y,
-                                                b.z,
-                                                c.x,
-                                                c.y,
-                                                c.z,
-                                                flat ? 0 : plane.x,
-                                                flat ? 0 : plane.y,
-                                                flat ? 0 : plane.z,
-                                                turned ? -1.0 : 1.0};
-            std::transform(values.begin(), values.end(), data_.triangles.data() + rows + 16 * i,
-                           [](double value) { return static_cast<float>(value); });
-        }
-        triangle_groups_.push_back(box);
-        sheet_box_.add(box);
-    }
-
     const bool any_plane_;
+    const LightPart& part_;
+    const WedgeTriangles& triangles_;
+    std::vector<std::uint32_t> faces_, touched_; // of groups of triangles: WedgeData's second of a pair; which are not 0
     std::vector<Vec3> points_;
     std::vector<Place> places_;
     WedgeData data_;
@@ -300,11 +256,11 @@ std::vector<Together> sides_apart(const Silhouette& silhouette)
 
 Vec3 point_in_part(const LightFrame& light, const LightPart& part, const Vec3& point)
 {
-    const Vec3 from = point - part.centre;
-    // Rounded once, here: triangles and edges then meet to the bit.
+    const Vec3 from = point - light.origin;
+    // Rounded once, here: triangles and edges then meet to the bit. The kernel moves triangles to the part's centre by the same subtraction.
     const auto rounded = [](double value) { return static_cast<double>(static_cast<float>(value)); };
-    return {rounded(from.dot(light.u) / part.half.x), rounded(from.dot(light.v) / part.half.y),
-            rounded(from.dot(light.direction) / part.half.z)};
+    return {rounded(rounded(from.dot(light.u) / part.half.x) - rounded(part.centre_x)),
+            rounded(rounded(from.dot(light.v) / part.half.y) - rounded(part.centre_y)), rounded(from.dot(light.direction) / part.half.z)};
 }
 
 std::vector<LightPart> light_parts(const LightFrame& light, int splits)
@@ -332,8 +288,108 @@ std::vector<LightPart> light_parts(const LightFrame& light, int splits)
     return parts;
 }
 
-WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, const LightFrame& light, const LightPart& part, bool apart,
-                     bool edges_too)
+namespace {
+
+// How many corners of the grid of parts see the triangle's front, or either side where both cast; of a part between them no other does.
+int corners_faced(const Topology& topology, std::uint32_t triangle, const std::array<Vec3, 4>& corners)
+{
+    const auto& t = topology.triangles()[triangle];
+    const Vec3 a(topology.vertices()[t[0]]), b(topology.vertices()[t[1]]), c(topology.vertices()[t[2]]);
+    const Vec3 normal = (b - a).cross(c - a);
+    int faced = 0;
+    for (const Vec3& corner : corners) {
+        // Beyond what the silhouette's rounding may take for facing.
+        const double before = normal.dot(corner - a), rounding = 1e-9 * normal.length() * ((corner - a).length() + (b - a).length() + (c - a).length());
+        faced += before > -rounding || (!topology.closed(triangle) && before < rounding);
+    }
+    return faced;
+}
+
+// A triangle's row: its vertices in order of their numbers; its plane N . p = D, so that |D| is 1 where that can be.
+void write_triangle(float* row, const std::array<Vec3, 3>& points)
+{
+    const Vec3 normal = (points[1] - points[0]).cross(points[2] - points[0]);
+    const double offset = normal.dot(points[0]);
+    double scale = std::abs(offset);
+    const auto flat = [&](double value) { return !(std::abs(value / scale) < everywhere); };
+    if (flat(normal.x) || flat(normal.y) || flat(normal.z)) scale = std::max(normal.length(), 1e-300);
+    const std::array<double, 13> values{points[0].x, points[0].y, points[0].z, points[1].x,      points[1].y,      points[1].z,   points[2].x,
+                                        points[2].y, points[2].z, normal.x / scale, normal.y / scale, normal.z / scale, offset / scale};
+    std::transform(values.begin(), values.end(), row, [](double value) { return static_cast<float>(value); });
+}
+
+WedgeTriangles::Box extent_of(const std::array<Vec3, 3>& points)
+{
+    WedgeTriangles::Box box{everywhere, -everywhere, everywhere, -everywhere, everywhere, -1};
+    for (const Vec3& point : points) {
+        const Place place = place_of(point);
+        if (place.near < 0) return {-everywhere, everywhere, -everywhere, everywhere, 0, everywhere};
+        box = {std::min(box.low_x, place.x), std::max(box.high_x, place.x), std::min(box.low_y, place.y),
+               std::max(box.high_y, place.y), std::min(box.far, place.near), std::max(box.near, place.near)};
+    }
+    return box;
+}
+
+void join(WedgeTriangles::Box& box, const WedgeTriangles::Box& other)
+{
+    box = {std::min(box.low_x, other.low_x), std::max(box.high_x, other.high_x), std::min(box.low_y, other.low_y),
+           std::max(box.high_y, other.high_y), std::min(box.far, other.far), std::max(box.near, other.near)};
+}
+
+} // namespace
+
+WedgeTriangles wedge_triangles(const Topology& topology, const LightFrame& light, const std::vector<LightPart>& parts)
+{
+    LightPart whole = parts.front();
+    whole.centre_x = whole.centre_y = 0;
+    const std::size_t side = static_cast<std::size_t>(std::lround(std::sqrt(parts.size())));
+    const std::array<Vec3, 4> corners{parts[0].centre, parts[side - 1].centre, parts[parts.size() - side].centre, parts.back().centre};
+    std::vector<Vec3> points;
+    points.reserve(topology.vertices().size());
+    for (const Imath::V3f& vertex : topology.vertices()) points.push_back(point_in_part(light, whole, Vec3(vertex)));
+
+    // Those that face the light, beside what lies beside them in its view; by and by those that not all parts see.
+    std::vector<std::uint32_t> used;
+    std::vector<std::array<float, 3>> keys;
+    Box view;
+    for (const Vec3& point : points)
+        if (point.z > 0) view.add(place_of(point));
+    const double width = std::max({view.high[0] - view.low[0], view.high[1] - view.low[1], 1e-30});
+    for (std::uint32_t i = 0; i < topology.triangles().size(); ++i) {
+        if (i % 4096 == 0) check_stop();
+        const int faced = corners_faced(topology, i, corners);
+        if (faced == 0) continue;
+        used.push_back(i);
+        const Place place = place_of(points[topology.triangles()[i][0]]);
+        const auto key = [&](double value, std::size_t axis) { return static_cast<float>(place.near < 0 ? 0 : (value - view.low[axis]) / width); };
+        keys.push_back({key(place.x, 0), key(place.y, 1), 0.0625F * static_cast<float>(faced)});
+    }
+    const SpatialOrder<3> order(std::move(keys));
+
+    WedgeTriangles triangles;
+    const std::size_t groups = (used.size() + group_size - 1) / group_size;
+    triangles.rows_of.assign(topology.triangles().size(), no_edge);
+    triangles.rows.assign(std::max<std::size_t>(groups, 1) * group_size * 16, 0.0F); // a plane of disparity 0 is before nothing
+    triangles.extents.assign(std::max<std::size_t>(groups, 1) * group_size * 6, -1.0F);
+    triangles.boxes.assign(groups, {everywhere, -everywhere, everywhere, -everywhere, everywhere, -1});
+    for (std::uint32_t row = 0; row < used.size(); ++row) {
+        const std::uint32_t number = used[order.get()[row]];
+        triangles.rows_of[number] = row;
+        std::array<std::uint32_t, 3> corner = topology.triangles()[number];
+        std::sort(corner.begin(), corner.end());
+        const std::array<Vec3, 3> at{points[corner[0]], points[corner[1]], points[corner[2]]};
+        write_triangle(triangles.rows.data() + 16 * row, at);
+        const WedgeTriangles::Box box = extent_of(at);
+        float* const extent = triangles.extents.data() + row / group_size * 96 + row % group_size;
+        const std::array<double, 6> values{box.low_x, box.high_x, box.low_y, box.high_y, box.near, box.far};
+        for (std::size_t k = 0; k < values.size(); ++k) extent[16 * k] = static_cast<float>(values[k]);
+        join(triangles.boxes[row / group_size], box);
+    }
+    return triangles;
+}
+
+WedgeData wedge_data(const Topology& topology, const WedgeTriangles& triangles, const Silhouette& silhouette, const LightFrame& light,
+                     const LightPart& part, bool apart, bool edges_too)
 {
     const std::vector<Together> groups = apart ? each_apart(silhouette) : sides_apart(silhouette);
     std::vector<std::size_t> group_of(silhouette.sheets());
@@ -344,17 +400,21 @@ WedgeData wedge_data(const Topology& topology, const Silhouette& silhouette, con
     if (edges_too)
         for (std::uint32_t i = 0; i < silhouette.edges.size(); ++i) edges[group_of[silhouette.edges[i].sheet]].push_back(i);
 
-    Builder builder(topology, light, part);
-    std::vector<std::array<std::uint32_t, 3>> triangles;
+    Builder builder(topology, triangles, light, part);
+    std::vector<std::array<std::uint32_t, 3>> facing;
+    std::vector<std::uint32_t> numbers;
     bool before = false;
     for (std::size_t g = 0; g < groups.size(); ++g) {
-        triangles.clear();
-        for (const std::uint32_t sheet : groups[g].sheets)
-            triangles.insert(triangles.end(), silhouette.facing.begin() + silhouette.facing_begin[sheet],
-                             silhouette.facing.begin() + silhouette.facing_begin[sheet + 1]);
+        facing.clear();
+        numbers.clear();
+        for (const std::uint32_t sheet : groups[g].sheets) {
+            const auto begin = static_cast<std::ptrdiff_t>(silhouette.facing_begin[sheet]), end = static_cast<std::ptrdiff_t>(silhouette.facing_begin[sheet + 1]);
+            facing.insert(facing.end(), silhouette.facing.begin() + begin, silhouette.facing.begin() + end);
+            numbers.insert(numbers.end(), silhouette.facing_numbers.begin() + begin, silhouette.facing_numbers.begin() + end);
+        }
         // Where all of the first side lies behind the light's plane, the other is the first.
         builder.begin_sheet(groups[g].side == 2 && !before ? 1 : groups[g].side);
-        builder.add_triangles(triangles);
+        builder.add_triangles(facing, numbers);
         builder.add_edges(silhouette.edges, edges[g]);
         before = builder.end_sheet();
     }

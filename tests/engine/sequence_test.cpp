@@ -98,7 +98,9 @@ TEST(Sequence, SilhouettesAreMadeOnce)
     EXPECT_EQ(a.edges.memory()(), b.edges.memory()());
     EXPECT_EQ(a.edge_ends.memory()(), b.edge_ends.memory()());
     EXPECT_EQ(a.edge_boxes.memory()(), b.edge_boxes.memory()());
-    EXPECT_EQ(a.triangles.memory()(), b.triangles.memory()());
+    EXPECT_EQ(a.triangle_groups.memory()(), b.triangle_groups.memory()());
+    EXPECT_EQ(std::get<PreparedSoftShadowVolume>(first.state().data).triangle_rows.memory()(),
+              std::get<PreparedSoftShadowVolume>(second.state().data).triangle_rows.memory()());
     EXPECT_NE(a.coverage.memory()(), b.coverage.memory()());
     for (const Stage& stage : second.state().stages) EXPECT_TRUE(stage.name == "prepare" || stage.name == "compile") << stage.name;
 }

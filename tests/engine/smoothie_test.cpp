@@ -27,7 +27,9 @@ Scene smoothie_scene(const Light& light, const std::vector<TriangleMesh>& caster
     return scene;
 }
 
-Smoothie of_width(double t, Falloff falloff = Falloff::sinusoidal) { return {.t_from = SmoothieWidth::t, .t = t, .falloff = falloff}; }
+Smoothie of_width(double t, Falloff falloff = Falloff::sinusoidal) { return {.t_from = SmoothieWidth::t, .t = t, .falloff = falloff, .two_sided = false}; }
+
+const Smoothie one_sided{.two_sided = false}; // the paper's
 
 // The middle of column x of `columns`, as a tangent: -1 to 1.
 double tangent_of(int x, int columns) { return (2 * x + 1.0) / columns - 1; }
@@ -85,7 +87,7 @@ TEST(SmoothieEdge, WidthFromTheLight)
         for (const double b : {1.0, 2.0, 4.0})
             for (const double r : {4.5, 8.0, 40.0}) {
                 const Image mask = mask_of(smoothie_scene(light, {half_plane(b)}, floor_at(static_cast<float>(r), size)),
-                                           Smoothie{.falloff = Falloff::linear});
+                                           Smoothie{.falloff = Falloff::linear, .two_sided = false});
                 const double width = h * (1 / b - 1 / r);
                 for (int x = 0; x < size; ++x) {
                     const double at = tangent_of(x, size);
@@ -104,7 +106,7 @@ TEST(SmoothieEdge, DirectionalLight)
         Scene scene = smoothie_scene(DirectionalLight{.direction = {0, 0, -1}, .angular_diameter_deg = degrees, .up = Vec3(0, 1, 0)},
                                      {half_plane(4)}, receivers(view, flat(size, size, static_cast<float>(r))));
         scene.occluders.camera = view;
-        const Image mask = mask_of(scene, Smoothie{.falloff = Falloff::linear});
+        const Image mask = mask_of(scene, Smoothie{.falloff = Falloff::linear, .two_sided = false});
         const double width = tangent * (r - 4);
         for (int x = 0; x < size; ++x) {
             const double at = 2 * tangent_of(x, size);
@@ -124,7 +126,7 @@ TEST(SmoothieEdge, HardAtContact)
     });
     const double h = 1;
     const Image mask =
-        mask_of(smoothie_scene(sphere_light(h), {half_plane(4)}, receivers(light_view(), ramp)), Smoothie{.falloff = Falloff::linear});
+        mask_of(smoothie_scene(sphere_light(h), {half_plane(4)}, receivers(light_view(), ramp)), Smoothie{.falloff = Falloff::linear, .two_sided = false});
     int last = 0;
     for (int y = 0; y < size; ++y) {
         const double width = h * (0.25 - 1 / static_cast<double>(ramp.depth[static_cast<std::size_t>(y) * size]));
@@ -173,7 +175,7 @@ TEST(Smoothie, LetsNoLightThrough)
             const Scene scene = smoothie_scene(sphere_light(0.5), some_casters(), beside ? from_beside(93) : floor_at(8, 93));
             const Image hard = mask_of(scene, of_width(0));
             for (const Smoothie& settings :
-                 {Smoothie{.silhouettes = silhouettes}, Smoothie{.t_from = SmoothieWidth::t, .t = 0.3, .silhouettes = silhouettes}}) {
+                 {Smoothie{.silhouettes = silhouettes, .two_sided = false}, Smoothie{.t_from = SmoothieWidth::t, .t = 0.3, .silhouettes = silhouettes, .two_sided = false}}) {
                 const Image mask = mask_of(scene, settings);
                 double darker = 0;
                 for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
@@ -193,7 +195,7 @@ TEST(Smoothie, NoWidthIsATentOverTheShadowMap)
     const auto scene_at = [&](int pixels) { return smoothie_scene(point_light(), some_casters(), floor_at(8, pixels)); };
     const Image hard = mask_of(scene_at(size), ShadowMap{});
     const auto texel = [&](int x, int y) { return x < 0 || y < 0 || x >= size || y >= size ? 1.0 : hard.at(x, y); };
-    for (const Smoothie& settings : {of_width(0, Falloff::linear), Smoothie{.falloff = Falloff::linear}}) { // a point light has no size
+    for (const Smoothie& settings : {of_width(0, Falloff::linear), Smoothie{.falloff = Falloff::linear, .two_sided = false}}) { // a point light has no size
         const Image mask = mask_of(scene_at(size * times), settings);
         int penumbra = 0;
         for (int y = 0; y < size * times; ++y)
@@ -226,8 +228,8 @@ TEST(Smoothie, OfATexelAndOfHalfTheMap)
 TEST(Smoothie, SilhouettesOfObjectsAndOfTheMapAgree)
 {
     const Scene scene = smoothie_scene(sphere_light(1), {closed_box({-1.03, -0.52, 3}, {0.97, 1.01, 4})}, floor_at(8, size));
-    const Image object = mask_of(scene, Smoothie{.falloff = Falloff::linear});
-    const Image map = mask_of(scene, Smoothie{.silhouettes = SilhouetteSource::image, .falloff = Falloff::linear});
+    const Image object = mask_of(scene, Smoothie{.falloff = Falloff::linear, .two_sided = false});
+    const Image map = mask_of(scene, Smoothie{.silhouettes = SilhouetteSource::image, .falloff = Falloff::linear, .two_sided = false});
     const double width = 1 / 4.0 - 1 / 8.0, texel = 2.0 / size;
     expect_same(object, map, texel * std::numbers::sqrt2 / width + bound_of(width, 2, size), "a box");
     EXPECT_GT(penumbra_of(map), 1000);
@@ -239,7 +241,7 @@ TEST(Smoothie, ReceiversOfACoarserCameraLeaveNoHoles)
     const double width = 0.25 * 2;
     for (const int pixels : {8, 31, 700}) {
         const Image mask =
-            mask_of(smoothie_scene(sphere_light(4), {half_plane(4)}, floor_at(8, pixels), 256), Smoothie{.falloff = Falloff::linear});
+            mask_of(smoothie_scene(sphere_light(4), {half_plane(4)}, floor_at(8, pixels), 256), Smoothie{.falloff = Falloff::linear, .two_sided = false});
         for (int y = 0; y < pixels; ++y)
             for (int x = 0; x < pixels; ++x) {
                 const double at = tangent_of(x, pixels), texel = 2.0 / 256;
@@ -255,11 +257,11 @@ TEST(Smoothie, ReceiversOfACoarserCameraLeaveNoHoles)
 TEST(Smoothie, ReceiversThatDoNotCast)
 {
     Scene scene = smoothie_scene(sphere_light(1), {closed_box({-1, -1, 3}, {1, 1, 4})}, floor_at(8, size));
-    const Image apart = mask_of(scene, Smoothie{});
+    const Image apart = mask_of(scene, one_sided);
     EXPECT_GT(penumbra_of(apart), 1000);
     // The floor casts now; its own edge is far outside.
     scene.objects.push_back({.name = "floor", .mesh = sheet(-80, 80, -80, 80, 8), .casts = true, .receives = true});
-    expect_same(apart, mask_of(scene, Smoothie{}), bound_of(0.125, 2, size), "a floor that casts");
+    expect_same(apart, mask_of(scene, one_sided), bound_of(0.125, 2, size), "a floor that casts");
 }
 
 // Casters that receive hide nothing of the floor's penumbra: where a camera sees both in one texel of the map, each has its own share.
@@ -273,7 +275,7 @@ TEST(Smoothie, ReceiversOnTheBlockerLeaveNoGapAtItsOutline)
     const auto with_box = [&](bool receives) {
         scene.objects.front().receives = receives;
         scene.receivers = {.camera = camera, .width = 512, .height = 512, .depth = {}};
-        return std::pair{mask_of(scene, Smoothie{}), *with_depth(scene, Smoothie{}).receivers.depth};
+        return std::pair{mask_of(scene, one_sided), *with_depth(scene, one_sided).receivers.depth};
     };
     const auto [with, depth] = with_box(true);
     const auto [without, floor] = with_box(false);
@@ -297,7 +299,7 @@ TEST(Smoothie, FinsBehindBlockersAreDropped)
 {
     const TriangleMesh roof = sheet(-2, 2, -2, 2, 3), below = closed_box({-1, -1, 4}, {1, 1, 5});
     const auto mask = [&](const std::vector<TriangleMesh>& casters) {
-        return mask_of(smoothie_scene(sphere_light(1), casters, floor_at(8, size)), Smoothie{});
+        return mask_of(smoothie_scene(sphere_light(1), casters, floor_at(8, size)), one_sided);
     };
     EXPECT_EQ(mask({roof, below}).pixels, mask({roof}).pixels);
     EXPECT_NE(mask({below}).pixels, mask({roof}).pixels);
@@ -324,7 +326,7 @@ TEST(Smoothie, TwoSidedComesFromTheOutlineAlone)
 // A receiver between a fin's own blocker and the light is lit whatever the least alpha of its texel.
 TEST(Smoothie, AFinShadesOnlyWhatLiesBehindIt)
 {
-    const Image mask = mask_of(smoothie_scene(sphere_light(1), {half_plane(4)}, floor_at(3.9f, size)), Smoothie{});
+    const Image mask = mask_of(smoothie_scene(sphere_light(1), {half_plane(4)}, floor_at(3.9f, size)), one_sided);
     for (const float v : mask.pixels) ASSERT_EQ(v, 1.0f);
 }
 
@@ -396,7 +398,7 @@ TEST(Smoothie, OpenMeshes)
 TEST(Smoothie, DepthMapsAlone)
 {
     const DepthMap occluder = boxes(size, size, 4, {{40, 80, 40, 80}});
-    const Mask mask = engine().shade(engine().prepare(sphere_light(1), occluders(light_view(), occluder), Smoothie{}), floor_at(8, size));
+    const Mask mask = engine().shade(engine().prepare(sphere_light(1), occluders(light_view(), occluder), one_sided), floor_at(8, size));
     EXPECT_EQ(std::count(mask.report.warnings.begin(), mask.report.warnings.end(),
                          "there are no objects that cast: silhouettes are those of the depth map (silhouettes image)"),
               1);
@@ -407,7 +409,7 @@ TEST(Smoothie, DepthMapsAlone)
     EXPECT_NEAR(mask.visibility.at(82, 60), fallen(Falloff::sinusoidal, at / width), bound_of(width, 2, size));
 
     const Mask asked = engine().shade(
-        engine().prepare(sphere_light(1), occluders(light_view(), occluder), Smoothie{.silhouettes = SilhouetteSource::image}),
+        engine().prepare(sphere_light(1), occluders(light_view(), occluder), Smoothie{.silhouettes = SilhouetteSource::image, .two_sided = false}),
         floor_at(8, size));
     EXPECT_EQ(asked.visibility.pixels, mask.visibility.pixels);
     for (const std::string& warning : asked.report.warnings) EXPECT_FALSE(holds(warning, "silhouettes are those")) << warning;
@@ -415,7 +417,7 @@ TEST(Smoothie, DepthMapsAlone)
 
 TEST(Smoothie, NothingCasts)
 {
-    const Mask mask = engine().shade(engine().prepare(sphere_light(1), occluders(light_view(), flat(16, 16, nothing_there)), Smoothie{}),
+    const Mask mask = engine().shade(engine().prepare(sphere_light(1), occluders(light_view(), flat(16, 16, nothing_there)), one_sided),
                                      floor_at(8, size));
     for (const float v : mask.visibility.pixels) ASSERT_EQ(v, 1.0f);
     EXPECT_EQ(std::count(mask.report.warnings.begin(), mask.report.warnings.end(),

@@ -157,8 +157,8 @@ TriangleMesh polygon(const std::vector<Point>& corners, double z, const Point& m
     return mesh_of(points, triangles);
 }
 
-const Smoothie fixed_width{.t_from = SmoothieWidth::t, .t = 0.5, .falloff = Falloff::linear};
-const Smoothie by_light{.falloff = Falloff::linear};
+const Smoothie fixed_width{.t_from = SmoothieWidth::t, .t = 0.5, .falloff = Falloff::linear, .two_sided = false};
+const Smoothie by_light{.falloff = Falloff::linear, .two_sided = false};
 
 DepthMap floor_at(float z) { return flat(96, 96, z); }
 

@@ -3,6 +3,8 @@
 
 #include "technique/wedge_data.hpp"
 
+#include <bit>
+
 namespace penumbra::test {
 namespace {
 
@@ -11,8 +13,9 @@ WedgeData data_of(const std::vector<TriangleMesh>& meshes, const Light& light, b
 {
     const LightFrame frame = light_frame(light);
     const Topology topology = topology_of(meshes);
-    const LightPart own = light_parts(frame, splits).at(part);
-    return wedge_data(topology, silhouette_of(topology, own.centre), frame, own, apart, edges_too);
+    const std::vector<LightPart> parts = light_parts(frame, splits);
+    const LightPart own = parts.at(part);
+    return wedge_data(topology, wedge_triangles(topology, frame, parts), silhouette_of(topology, own.centre), frame, own, apart, edges_too);
 }
 
 TEST(LightParts, CoverTheRectangle)
@@ -62,8 +65,7 @@ TEST(WedgeData, CountsAndPadding)
     EXPECT_EQ(apart.triangle_count, 2u + 6u);
     EXPECT_EQ(apart.edges.size(), 2u * WEDGE_GROUP * 8);
     EXPECT_EQ(apart.edge_ends.size(), 2u * WEDGE_GROUP * 6);
-    EXPECT_EQ(apart.triangles.size(), 2u * WEDGE_GROUP * 16);
-    EXPECT_EQ(apart.triangle_extents.size(), 2u * WEDGE_GROUP * 5);
+    EXPECT_EQ(apart.triangle_groups.size(), 2u * 2); // eight triangles of one group, in two sheets
     for (const std::vector<float>& boxes : {apart.sheet_boxes, apart.edge_boxes, apart.triangle_boxes}) EXPECT_EQ(boxes.size(), 80u);
     // What pads a group is passed in neither direction, covers nothing and is near nothing.
     for (std::size_t i = 4; i < WEDGE_GROUP; ++i) {
@@ -71,10 +73,10 @@ TEST(WedgeData, CountsAndPadding)
         EXPECT_EQ(apart.edge_ends[2 * 16 + i], -1.0F);
         EXPECT_EQ(apart.edge_ends[5 * 16 + i], -1.0F);
     }
-    for (std::size_t i = 2; i < WEDGE_GROUP; ++i) {
-        EXPECT_EQ(apart.triangle_extents[64 + i], -1.0F);
-        for (std::size_t k = 9; k < 12; ++k) EXPECT_EQ(apart.triangles[16 * i + k], 0.0F);
-    }
+    EXPECT_EQ(apart.triangle_groups[0], 0);
+    EXPECT_EQ(apart.triangle_groups[2], 0);
+    EXPECT_EQ((apart.triangle_groups[1] | apart.triangle_groups[3]) & 0xffff, 0xff);
+    EXPECT_EQ(apart.triangle_groups[1] & apart.triangle_groups[3] & 0xffff, 0);
 
     const WedgeData together = data_of(meshes, rectangle_light(1, 1), false);
     EXPECT_EQ(together.sheets.size(), 1u);
@@ -90,6 +92,50 @@ TEST(WedgeData, CountsAndPadding)
     EXPECT_TRUE(none.sheets.empty());
     EXPECT_EQ(none.sheet_boxes.size(), 80u); // still a block to read, which meets nothing
     EXPECT_EQ(none.sheet_boxes[64], -1.0F);
+}
+
+// Triangles are there once for all parts, those that face any of them; each part knows which face it, and has them where the kernel puts them.
+TEST(WedgeData, TrianglesOfAllParts)
+{
+    std::vector<TriangleMesh> meshes = soup(60, {-6, -6, 1.5}, {6, 6, 12}, 3);
+    meshes.push_back(closed_box({-1, -0.7, 3}, {1, 0.7, 5}));
+    meshes.push_back(sheet(-1, 1, -1, 1, -2)); // behind the light
+    const LightFrame frame = light_frame(rectangle_light(2, 1.5));
+    const Topology topology = topology_of(meshes);
+    const std::vector<LightPart> parts = light_parts(frame, 3);
+    const WedgeTriangles triangles = wedge_triangles(topology, frame, parts);
+    std::vector<int> faced(topology.triangles().size(), 0);
+    std::uint64_t pairs = 0;
+    for (const LightPart& part : parts) {
+        const Silhouette silhouette = silhouette_of(topology, part.centre);
+        ASSERT_EQ(silhouette.facing_numbers.size(), silhouette.facing.size());
+        for (std::size_t i = 0; i < silhouette.facing.size(); ++i) {
+            const std::uint32_t number = silhouette.facing_numbers[i], row = triangles.rows_of[number];
+            ++faced[number];
+            std::array<std::uint32_t, 3> own = silhouette.facing[i], whole = topology.triangles()[number];
+            std::ranges::sort(own);
+            std::ranges::sort(whole);
+            ASSERT_EQ(own, whole);
+            ASSERT_NE(row, no_edge);
+            for (std::size_t c = 0; c < 3; ++c) {
+                const Vec3 at = point_in_part(frame, part, Vec3(topology.vertices()[own[c]]));
+                const float* const vertex = triangles.rows.data() + 16 * row + 3 * c;
+                EXPECT_EQ(vertex[0] - static_cast<float>(part.centre_x), static_cast<float>(at.x));
+                EXPECT_EQ(vertex[1] - static_cast<float>(part.centre_y), static_cast<float>(at.y));
+                EXPECT_EQ(vertex[2], static_cast<float>(at.z));
+            }
+        }
+        for (const bool apart : {false, true}) {
+            const WedgeData data = wedge_data(topology, triangles, silhouette, frame, part, apart, true);
+            std::uint64_t counted = 0;
+            for (std::size_t i = 0; i < data.triangle_groups.size(); i += 2) counted += static_cast<std::uint64_t>(std::popcount(static_cast<std::uint32_t>(data.triangle_groups[i + 1]) & 0xffffU));
+            EXPECT_EQ(counted, data.triangle_count);
+            pairs += counted;
+        }
+    }
+    EXPECT_GT(pairs, 2u * 9 * 40);
+    // Kept though they face no part: only what rounding cannot tell.
+    for (std::size_t t = 0; t < faced.size(); ++t) EXPECT_EQ(faced[t] > 0, triangles.rows_of[t] != no_edge) << t;
 }
 
 // What is closed or shows one side alone is one sheet; a surface that shows both sides two, after it, one behind the other.

@@ -19,7 +19,7 @@ TEST(Descriptions, Smoothie)
     EXPECT_EQ(keys["t"]["maximum"], 2.0);
     EXPECT_EQ(keys["silhouettes"]["enum"], (std::vector<std::string>{"object", "image"}));
     EXPECT_EQ(keys["falloff"]["enum"], (std::vector<std::string>{"sinusoidal", "linear"}));
-    EXPECT_EQ(keys["two_sided"]["default"], false);
+    EXPECT_EQ(keys["two_sided"]["default"], true);
     EXPECT_EQ((*found)["lights"], (std::vector<std::string>{"rectangle", "sphere", "point", "directional"}));
 }
 

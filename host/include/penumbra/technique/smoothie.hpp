@@ -19,7 +19,7 @@ struct Smoothie {
     SilhouetteSource silhouettes =
         SilhouetteSource::object;          // of the objects that cast (the paper's section 3), or of the depth map (its section 6)
     Falloff falloff = Falloff::sinusoidal; // 3.1
-    bool two_sided = false;                // beyond the paper: an inner fin too, half lit at the silhouette
+    bool two_sided = true;                 // beyond the paper: an inner fin too, half lit at the silhouette
     double bias = 1.0;                     // as of ShadowMap
     double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
 };

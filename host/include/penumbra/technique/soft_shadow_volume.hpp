@@ -7,6 +7,7 @@ namespace penumbra {
 
 enum class Coverage { linear, analytic, texture };
 enum class Lookup { nearest, bilinear, quadrilinear };
+enum class Silhouettes { centre, per_receiver };
 enum class Overlap { sum, max, half_min, product };
 enum class WedgeBuffer { binary32, int16, six_bits, twelve_bits };
 enum class WedgeCulling { none, loose, far_depth, tight };
@@ -15,6 +16,9 @@ enum class WedgeCulling { none, loose, far_depth, tight };
 // the penumbra wedge of each silhouette edge. Exact for a caster whose silhouette is the same from all of the light, as of a planar one.
 struct SoftShadowVolume {
     Preset preset = Preset::best; // what the other settings started from
+    // From where silhouettes are found. per_receiver: from each receiver, and triangles are counted before each of 32 x 32 samples of the
+    // light (Laine et al. 2005): what rays to those samples see. Of rectangles and points, with nothing else changed but light, culling, bias.
+    Silhouettes silhouettes = Silhouettes::centre;
     Coverage coverage = Coverage::analytic; // how an edge's share of the light is found (Papers I, IV, III)
     bool smooth = false;                    // linear: s' = 3 s^2 - 2 s^3 (Paper I, 4.2)
     int corner_wedges = 0;                  // linear: extra wedges at a corner of 0 degrees, fewer up to a right angle (Paper I, Fig. 7)
