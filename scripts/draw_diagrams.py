@@ -82,6 +82,7 @@ def architecture():
     d.arrow((230, 286), (230, 333))
 
     d.box(60, 440, 150, 62, "host/silhouette", ["edges, loops"])
+    d.box(430, 334, 126, 62, "host/refine", ["which receivers"])
     d.box(430, 440, 150, 62, "host/trace", ["Embree: rays"])
     d.box(260, 540, 320, 62, "host/depth_image", ["depth images as casters and receivers"])
     d.box(190, 640, 390, 62, "host/opencl", ["devices, programs"])
@@ -90,7 +91,8 @@ def architecture():
     d.arrow((320, 396), (320, 539))
     d.arrow((390, 396), (460, 439))
     d.arrow((415, 286), (415, 539))
-    d.arrow((505, 286), (505, 439))
+    d.arrow((493, 286), (493, 333))
+    d.arrow((569, 286), (569, 439))
     d.arrow((505, 502), (505, 539))
     d.arrow((420, 602), (420, 639))
 
