@@ -102,6 +102,11 @@ void check_size(const DepthMap& map, int width, int height, std::string_view whe
 
 namespace {
 
+bool shows_nothing(const DepthMap& map)
+{
+    return std::ranges::none_of(map.depth, [](float z) { return std::isfinite(z); });
+}
+
 DepthMap empty_view(int width, int height)
 {
     return {.width = width, .height = height, .depth = std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), nothing_there)};
@@ -121,6 +126,7 @@ Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camer
         if (back) views.back = tracer->back(camera, width, height);
         if (layers > 0) views.layers = tracer->layers(camera, width, height, layers + 1);
         if (!views.layers.empty()) views.layers.erase(views.layers.begin()); // the front itself
+        while (!views.layers.empty() && shows_nothing(views.layers.back())) views.layers.pop_back();
     }
     if (!with_images) return views;
     const auto images = state.images(role, device);

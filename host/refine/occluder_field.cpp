@@ -7,7 +7,8 @@
 namespace penumbra {
 namespace {
 
-constexpr int finest = 256; // cells a side: larger maps are joined
+constexpr int finest = 256;       // cells a side: larger maps are joined
+constexpr int most_cells = 2048;  // that a patch asks about: one that has to ask more counts as not resolved
 constexpr float nothing_low = std::numeric_limits<float>::max(), nothing_high = -nothing_low;
 
 } // namespace
@@ -19,6 +20,7 @@ struct OccluderField::Query {
     double level, slope_xi, slope_eta, margin;
     double reach_x, reach_y; // how far a penumbra goes in xi and eta for each height above the receiver
     double rise;             // that heights above the receiver's must have
+    int left = most_cells;
     double plane(double xi, double eta) const { return level + slope_xi * xi + slope_eta * eta; }
 };
 
@@ -113,11 +115,12 @@ bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
     return cell_resolved(query, levels_.size() - 1, 0, 0);
 }
 
-bool OccluderField::cell_resolved(const Query& query, std::size_t level, int x, int y) const
+bool OccluderField::cell_resolved(Query& query, std::size_t level, int x, int y) const
 {
     const Level& cells = levels_[level];
     const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(cells.width) + static_cast<std::size_t>(x);
     const double low = cells.low[at], high = cells.high[at];
+    if (query.left-- <= 0) return false;
     if (!(high > query.low)) return true; // nothing, or behind every receiver
 
     // In the light's view a cell of the finest level has this size; the last ones may be cut off, which is no matter.

@@ -43,7 +43,7 @@ private:
     };
     struct Query;
     double height_of(double z) const { return view_.orthographic ? -z : 1 / z; }
-    bool cell_resolved(const Query& query, std::size_t level, int x, int y) const;
+    bool cell_resolved(Query& query, std::size_t level, int x, int y) const;
     void add_level();
 
     LightFrame light_;

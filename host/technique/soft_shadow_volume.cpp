@@ -242,9 +242,12 @@ cl_float4 eye_of(const ReceiverView& view, const WedgeLight& light, bool wanted)
 }
 
 // Of the surfaces that the occluder maps show, where there are no objects.
-Topology topology_of_maps(const LightDepth& maps)
+// From the centre what lies behind the front would be counted twice; seen from each receiver it is not.
+Topology topology_of_maps(const LightDepth& maps, Silhouettes silhouettes)
 {
-    const std::vector<TriangleMesh> meshes = surfaces_of(maps, false);
+    LightDepth used = maps;
+    if (silhouettes == Silhouettes::centre) used.layers = {};
+    const std::vector<TriangleMesh> meshes = surfaces_of(used, false);
     std::vector<const TriangleMesh*> pointers;
     for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
     return Topology(pointers);
@@ -466,7 +469,7 @@ PreparedSoftShadowVolume prepare(opencl::Work& work, const Casting& casting, con
         warn_of_edges(*topology, findings.warnings);
     } else {
         const LightDepth& maps = casting.depth;
-        topology = std::make_shared<const Topology>(topology_of_maps(maps));
+        topology = std::make_shared<const Topology>(topology_of_maps(maps, settings.silhouettes));
         texel = {2 * maps.camera.half_extent.x / maps.width, 2 * maps.camera.half_extent.y / maps.height};
     }
     work.moved(topology->bytes());

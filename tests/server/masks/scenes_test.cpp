@@ -239,7 +239,7 @@ TEST(Scenes, CanBeAskedAboutAndLetGo)
 
 TEST(Scenes, HaveABudget)
 {
-    Running tight{server::Options{.device = {}, .token = {}, .slots = 1, .scenes_bytes = 1000}};
+    Running tight{server::Options{.device = {}, .token = {}, .slots = 1, .spares = 0, .scenes_bytes = 1000}};
     const Reply refused = keep(tight.port);
     EXPECT_EQ(refused.status, 413);
     EXPECT_NE(refused.detail().find("1000"), std::string::npos) << refused.body;

@@ -100,7 +100,8 @@ std::vector<Expensive> expensive()
     const auto add = [&](const char* name, const Json& scene, const DepthMap& front, const DepthMap& behind, double half, const Json& technique) {
         all.push_back({name, request_of(scene, front, behind, half, technique)});
     };
-    add("soft_shadow_map", scene_json(), checkers(1024), floor, 8, {{"kind", "soft_shadow_map"}, {"sides", "front"}});
+    add("soft_shadow_map", scene_json(), checkers(1024), floor, 8, {{"kind", "soft_shadow_map"}, {"preset", "paper"}, {"sides", "front"}});
+    add("soft_shadow_map, union", scene_json(), checkers(1024), floor, 8, {{"kind", "soft_shadow_map"}, {"tolerance", 0}, {"sides", "front"}});
     add("soft_shadow_volume", scene_json(), checkers(256), floor, 8, {{"kind", "soft_shadow_volume"}});
     add("soft_shadow_volume, parts", scene_json(), checkers(128), floor, 8, {{"kind", "soft_shadow_volume"}, {"light_splits", 16}});
     add("smoothie", scene_json(), checkers(512), floor, 8, {{"kind", "smoothie"}});
