@@ -33,7 +33,8 @@ export function courtyard_source() {
       kind: "rectangle", position: [-3.4, 6.2, 4.8], target: [0, 0.6, -0.6],
       width: 0.9, length: 0.9, radius: 0.5, angular_diameter_deg: 4,
     },
-    fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both" },
+    // Sums of patches: the union takes half a second here, and the light is to be followed.
+    fixed_light: "", lights: EVERY_LIGHT, renders: true, suggested: { sides: "both", visibility: "sum" },
     technique: "", settings: {}, drafts: [], stand_ins: ["soft_shadow_volume", "shadow_map"], picture: null,
     small: { size: [256, 256], objects, occluders: { resolution: [192, 192] }, receivers: { camera: courtyard_view, resolution: [256, 256] }, files },
   };

@@ -74,10 +74,10 @@ class Page(PageTest):
 
     def test_a_light_that_a_technique_does_not_take_is_said_so(self):
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "#technique_a .notice"), [])
-        Select(self.find("[name=light_kind]")).select_by_value("sphere")
-        self.assertIn("takes no sphere light", self.find("#technique_a .notice").text)
+        Select(self.find("[name=light_kind]")).select_by_value("directional")
+        self.assertIn("takes no directional light", self.find("#technique_a .notice").text)
         self.wait_for("return !document.getElementById('problem').hidden")
-        self.assertIn("sphere", self.problem())
+        self.assertIn("directional", self.problem())
         self.assertTrue(all("422" in error for error in self.console_errors()))
 
     def test_techniques_switch_with_their_controls(self):
@@ -577,7 +577,7 @@ class Relit(PageTest):
         self.watch()
         self.change(lambda: Select(self.find("[name=light_kind]")).select_by_value("sphere"))
         self.wait_for("return window.seen.length > 0 && window.seen.at(-1)[0] === 'depth_trace'")
-        self.assertEqual(self.js("return window.seen")[0][0], "shadow_map")
+        self.assertEqual(self.js("return window.seen")[0][0], "soft_shadow_map")
         self.assertEqual(self.problem(), "")
 
     def test_the_picture_under_the_light_as_the_command_line_makes_it(self):
