@@ -13,7 +13,7 @@ constexpr int reference_samples = 4096, sweep_samples = 1024;
 // As published: patches summed.
 SoftShadowMap paper(Sides sides, Accumulator accumulator = Accumulator::binary32)
 {
-    return {.preset = Preset::paper, .visibility = PatchVisibility::sum, .sides = sides, .accumulator = accumulator, .tolerance = 0};
+    return {.preset = Preset::paper, .visibility = PatchVisibility::sum, .sides = sides, .layers = 0, .accumulator = accumulator, .tolerance = 0};
 }
 
 void emit(Row row, const char* bench, Occluder occluder, double parameter)
