@@ -72,7 +72,7 @@ PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepa
     const int entries = static_cast<int>(maps.size());
     if (sides != Sides::front) maps.push_back(depth.back);
     for (int i = 0; i < entries; ++i) other.push_back(entries > 1 ? ((i ^ 1) < entries ? i ^ 1 : -1) : sides == Sides::both ? 1 : -1);
-    if (sides != Sides::front) other.push_back(entries == 1 ? 0 : -1);
+    if (sides != Sides::front) other.push_back(entries > 0 ? 0 : -1);
     return prepare_union(work, {.depth = maps, .other = other, .from = from, .size = size, .precision = prepared.precision, .shape = depth.light.shape}, prepared.view);
 }
 
