@@ -15,7 +15,7 @@ namespace {
 constexpr int coarsest = 16;         // pixels along a block's side
 constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
 constexpr float turned = 0.15f;      // how far its normals may turn, in radians
-constexpr double most_passed = 0.25; // of the light, from one shaded receiver to the next
+constexpr double most_passed = 0.1; // of the light, from one shaded receiver to the next
 constexpr std::size_t many_blocks = 128; // that a thread takes at once
 constexpr int rows_together = 64;
 

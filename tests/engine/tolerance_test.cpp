@@ -52,23 +52,26 @@ int scene_count()
     return text ? std::max(1, std::atoi(text)) : 24;
 }
 
-// Without noise and with penumbrae of the light's width: what may be taken from neighbours. Coarser patches stand for at most six times the tolerance of
-// the light's width, of which half is covered wrongly at the worst on each of two edges: that is theirs beside what the receivers may be off.
+// On average it is kept. A single pixel may be off by more: between two shaded receivers an edge passes a tenth of the light at the most, and the corners of
+// what casts bend visibility there. Four times is measured (2.8 on 60 scenes), with half on top; it is not derived.
 TEST(Tolerance, IsKeptOnRandomScenes)
 {
     const Engine engine;
+    double worst = 0; // difference over tolerance
     for (int seed = 1; seed <= scene_count(); ++seed) {
         const Scene scene = plates(static_cast<unsigned>(seed), 200);
         for (const double tolerance : {0.02, 0.005}) {
             const Mask whole = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, 0), some = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, tolerance);
             const Metrics off = compare(some.visibility, whole.visibility);
             EXPECT_LE(off.mae_shadow, tolerance) << seed;
-            EXPECT_LE(off.max, 7 * tolerance) << seed;
+            EXPECT_LE(off.max, 4 * tolerance) << seed;
+            worst = std::max(worst, off.max / tolerance);
             EXPECT_EQ(some.report.receivers, 200u * 200) << seed;
             EXPECT_LE(some.report.receivers_shaded, some.report.receivers) << seed;
             EXPECT_EQ(whole.report.receivers, 0u);
         }
     }
+    std::printf("[  MEASURE ] the largest difference is %.2f times the tolerance\n", worst);
 }
 
 TEST(Tolerance, SparesMostReceiversUnderAWideLight)
