@@ -1,5 +1,6 @@
 // Occluder maps: depth to disparity, area-correct reduction, and the pyramid that finds the few texels that matter.
 #include "common/shared.h"
+#include "common/texel_steps.clh"
 
 inline float disparity_of(const float depth)
 {
@@ -73,44 +74,12 @@ __kernel void nearest_of_block(const int2 size, const int stride, __global const
     nearest[y * blocks.x + x] = d;
 }
 
-// Whether the step from a to b lies on one surface: a plane's disparity is linear across the image, so the slope before or after must be of
-// the same sign and at least half as steep (curvature may double a slope from one texel to the next).
-inline bool explains(const float slope, const float step, const float rounding)
-{
-    return step * slope > 0.0f && fabs(step) <= 2.0f * fabs(slope) + rounding;
-}
-
-// Whether a and b are on one surface. Each disparity is off by up to `precision` of itself, so a difference by twice that, and a doubled slope by
-// twice that again.
-inline bool is_joined(const float before, const float a, const float b, const float after, const float precision)
-{
-    const float step = b - a, rounding = 6.0f * precision * fmax(a, b);
-    return a > 0.0f && b > 0.0f
-           && (fabs(step) <= rounding || (before > 0.0f && explains(a - before, step, rounding)) || (after > 0.0f && explains(after - b, step, rounding)));
-}
-
-// The size of the step from a to b when they are on one surface, else 0.
-inline float joined_step(const float before, const float a, const float b, const float after, const float precision)
-{
-    return is_joined(before, a, b, after, precision) ? fabs(b - a) : 0.0f;
-}
-
-// slope_steps: how much the surface's disparity changes from one texel to the next, across and down: the larger of the steps to the two
-// neighbours that are on the same surface. 0 where neither is.
+// slope_steps: steps_of_texel of every texel.
 //
 //   precision  relative error of a disparity
 __kernel void slope_steps(const int2 size, const float precision, __global const float2* restrict texels, __global float2* restrict steps)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-
-    float row[5], column[5];
-    for (int i = 0; i < 5; ++i) {
-        const int nx = x + i - 2, ny = y + i - 2;
-        row[i] = nx >= 0 && nx < size.x ? texels[y * size.x + nx].x : 0.0f;
-        column[i] = ny >= 0 && ny < size.y ? texels[ny * size.x + x].x : 0.0f;
-    }
-    steps[y * size.x + x] = (float2)(fmax(joined_step(row[0], row[1], row[2], row[3], precision), joined_step(row[1], row[2], row[3], row[4], precision)),
-                                     fmax(joined_step(column[0], column[1], column[2], column[3], precision),
-                                          joined_step(column[1], column[2], column[3], column[4], precision)));
+    steps[y * size.x + x] = steps_of_texel(size, texels, x, y, precision);
 }

@@ -51,52 +51,51 @@ std::vector<cl_uint> light_rows(LightShape shape)
     return rows;
 }
 
-// One map on its way into patches.
-struct Surfaces {
-    OccluderMap map;
-    opencl::Buffer<cl_float4> parts; // of a larger map: what the texels' surfaces cover
-};
-
-// A larger map becomes surfaces with what they cover of each texel: the mean of two surfaces is none of them.
-Surfaces surfaces_of(opencl::Work& work, const UnionMaps& maps, const cl::Buffer& depth, const OccluderView& view, const opencl::Specialisation& program)
+// The texels of all maps. A larger map becomes surfaces with what they cover of each texel: the mean of two surfaces is none of them.
+void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
     const MapSize from = maps.from, size = maps.size;
-    if (count_of(from) <= count_of(size)) return {.map = occluder_map(work, depth, from, size, Reduction::nearest, maps.precision, program), .parts = {}};
-    Surfaces surfaces{.map = {.texels = work.buffer<cl_float2>(count_of(size), "occluder texels"), .steps = work.buffer<cl_float2>(count_of(size), "occluder slopes")},
-                      .parts = work.buffer<cl_float4>(count_of(size), "covered parts of texels")};
+    const std::size_t count = count_of(size);
+    const bool larger = count_of(from) > count;
+    prepared.texels = work.buffer<cl_float2>(maps.depth.size() * count, "occluder texels");
+    if (larger) prepared.parts = work.buffer<cl_float4>(maps.depth.size() * count, "covered parts of texels");
     const cl_float2 gap = gap_of(view);
-    work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count_of(size) * 24, dimensions(from), depth, dimensions(size),
-                std::min(gap.s[0], gap.s[1]), surfaces.map.texels, surfaces.parts);
-    work.launch(program, "slope_steps", grid_of(size), {16, 8}, count_of(size) * 16, dimensions(size), static_cast<float>(maps.precision), surfaces.map.texels,
-                surfaces.map.steps);
-    return surfaces;
-}
-
-// The levels of map `number` above its texels.
-void join_patches(opencl::Work& work, const PreparedUnion& prepared, const OccluderView& view, MapSize size, int number, const opencl::Specialisation& program)
-{
-    const std::vector<MapSize> sizes = level_sizes(size);
-    std::size_t below = static_cast<std::size_t>(number) * prepared.per_map;
-    for (std::size_t level = 1; level < sizes.size(); ++level) {
-        const std::size_t begin = below + count_of(sizes[level - 1]);
-        const float cells = std::ldexp(1.f, static_cast<int>(level));
-        const cl_float2 moves{{0.5f / (view.light_scale_x * view.texel_x * cells), 0.5f / (view.light_scale_y * view.texel_y * cells)}};
-        work.launch(program, "joined_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level - 1]),
-                    dimensions(sizes[level]), static_cast<cl_int>(below), static_cast<cl_int>(begin), prepared.reach, prepared.patches);
-        work.launch(program, "solid_patches", grid_of(sizes[level]), {16, 4}, count_of(sizes[level]) * 5 * sizeof(MicroPatch), dimensions(sizes[level]), moves,
-                    static_cast<cl_int>(begin), prepared.reach, prepared.patches);
-        below = begin;
+    for (std::size_t i = 0; i < maps.depth.size(); ++i) {
+        const auto begin = static_cast<cl_int>(i * count);
+        if (larger)
+            work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count * 24, dimensions(from), maps.depth[i], dimensions(size), begin,
+                        std::min(gap.s[0], gap.s[1]), prepared.texels, prepared.parts);
+        else
+            work.launch(program, "texels_of_map", grid_of(size), {16, 8}, count * 12, dimensions(size), begin, maps.depth[i], prepared.texels);
     }
 }
 
-// The greatest disparity of all maps, from their last levels.
-float nearest_of(opencl::Work& work, const PreparedUnion& prepared, MapSize size)
+// Sides of a work-group that joins what lies below one of the last level's patches.
+constexpr std::array<std::size_t, 2> joining{8, 8};
+
+// The patches of all maps, and their greatest disparity.
+void add_patches(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
-    const std::size_t last = count_of(level_sizes(size).back());
-    float nearest = 0;
-    for (int map = 1; map <= prepared.maps; ++map)
-        for (const float reach : work.read(prepared.reach, static_cast<std::size_t>(map) * prepared.per_map - last, last)) nearest = std::max(nearest, reach);
-    return nearest;
+    const std::vector<MapSize> sizes = level_sizes(maps.size);
+    const std::size_t texels = count_of(maps.size), count = maps.depth.size(), last = count_of(sizes.back());
+    for (std::size_t level = 1; level < sizes.size(); ++level) prepared.above += count_of(sizes[level]);
+    prepared.edges = work.buffer<cl_float4>(count * texels, "occluder texels' edges");
+    prepared.texel_reach = work.buffer<float>(count * texels, "occluder texels' reach");
+    prepared.reach = work.buffer<float>(count * prepared.above, "micro-patches' reach");
+    prepared.patches = work.buffer<MicroPatch>(count * prepared.above, "micro-patches");
+    const auto other = work.lend(maps.other, "maps of the other sides");
+    const auto nearest = work.buffer<float>(count * last, "greatest disparities");
+
+    const cl_int2 size = dimensions(maps.size);
+    const auto all = static_cast<cl_int>(count), above = static_cast<cl_int>(prepared.above);
+    const auto width = static_cast<std::size_t>(sizes[1].width), height = static_cast<std::size_t>(sizes[1].height);
+    work.launch(program, "micro_patches", {width, height * count}, {16, 4}, count * texels * (28 + sizeof(MicroPatch) / 4), size, all, above, static_cast<float>(maps.precision), gap_of(view),
+                static_cast<cl_int>(static_cast<bool>(prepared.parts)), other, prepared.texels, prepared.parts, prepared.edges, prepared.texel_reach, prepared.reach, prepared.patches);
+    work.launch(program, "joined_patches", {static_cast<std::size_t>(sizes.back().width) * joining[0], static_cast<std::size_t>(sizes.back().height) * count * joining[1]}, joining,
+                count * prepared.above * sizeof(MicroPatch), size, all, above, prepared.reach, prepared.patches, nearest);
+    const cl_float2 moves{{0.5f / (view.light_scale_x * view.texel_x), 0.5f / (view.light_scale_y * view.texel_y)}};
+    work.launch(program, "solid_patches", {prepared.above, count}, {64, 1}, count * prepared.above * sizeof(MicroPatch), size, all, above, moves, prepared.reach, prepared.patches);
+    for (const float reach : work.read(nearest)) prepared.nearest = std::max(prepared.nearest, reach);
 }
 
 } // namespace
@@ -110,29 +109,13 @@ opencl::Specialisation union_program(int lanes)
 PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view)
 {
     const opencl::Specialisation program = union_program(work.context().quirks().lanes);
-    std::vector<Surfaces> surfaces;
-    for (const cl::Buffer& depth : maps.depth) surfaces.push_back(surfaces_of(work, maps, depth, view, program));
-
-    const std::size_t texels = count_of(maps.size), count = surfaces.size();
-    PreparedUnion prepared{.texels = {}, .steps = {}, .reach = {}, .patches = {}, .light_rows = {}, .maps = static_cast<int>(count)};
+    PreparedUnion prepared;
+    prepared.maps = static_cast<int>(maps.depth.size());
     const std::vector<cl_uint> rows = light_rows(maps.shape);
     prepared.light_rows = work.upload(std::span<const cl_uint>(rows), "samples of the light");
     for (const cl_uint row : rows) prepared.light_samples += std::popcount(row);
-    for (const MapSize level : level_sizes(maps.size)) prepared.per_map += count_of(level);
-    prepared.texels = work.buffer<cl_float2>(count * texels, "occluder texels");
-    prepared.steps = work.buffer<cl_float2>(count * texels, "occluder slopes");
-    prepared.reach = work.buffer<float>(count * prepared.per_map, "micro-patches' reach");
-    prepared.patches = work.buffer<MicroPatch>(count * prepared.per_map, "micro-patches");
-    for (std::size_t i = 0; i < count; ++i) {
-        const int other = maps.other[i];
-        work.copy(surfaces[i].map.texels, prepared.texels, i * texels);
-        work.copy(surfaces[i].map.steps, prepared.steps, i * texels);
-        work.launch(program, "micro_patches", grid_of(maps.size), {16, 4}, texels * (16 + sizeof(MicroPatch)), dimensions(maps.size), static_cast<float>(maps.precision), gap_of(view),
-                    static_cast<cl_int>(other >= 0), static_cast<cl_int>(static_cast<bool>(surfaces[i].parts)), static_cast<cl_int>(i * prepared.per_map), surfaces[i].map.texels,
-                    other >= 0 ? surfaces[static_cast<std::size_t>(other)].map.texels.memory() : cl::Buffer(), surfaces[i].parts, prepared.reach, prepared.patches);
-        join_patches(work, prepared, view, maps.size, static_cast<int>(i), program);
-    }
-    prepared.nearest = nearest_of(work, prepared, maps.size);
+    add_texels(work, maps, view, program, prepared);
+    add_patches(work, maps, view, program, prepared);
     return prepared;
 }
 
@@ -142,9 +125,9 @@ void shade_union(opencl::Work& work, const PreparedUnion& prepared, const Occlud
     const int lanes = work.context().quirks().lanes;
     const Tiling tiling = tiling_of(receivers.view, lanes);
     work.launch(union_program(lanes), "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + prepared.patches.bytes(), receivers.view, view, static_cast<cl_int>(prepared.maps),
-                static_cast<cl_int>(prepared.per_map), prepared.nearest, static_cast<float>(shading.bias), static_cast<float>(std::max(shading.precision, receivers.precision)),
+                static_cast<cl_int>(prepared.above), prepared.nearest, static_cast<float>(shading.bias), static_cast<float>(std::max(shading.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && lanes > 1), static_cast<float>(coarse_per_tolerance * shading.tolerance), prepared.reach,
-                prepared.patches, prepared.texels, prepared.steps, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, prepared.light_rows,
+                prepared.patches, prepared.texels, prepared.edges, prepared.texel_reach, prepared.parts, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, prepared.light_rows,
                 static_cast<cl_int>(prepared.light_samples), visibility, evaluated, work.stop());
 }
 

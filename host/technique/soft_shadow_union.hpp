@@ -8,16 +8,18 @@
 
 namespace penumbra {
 
-// All maps behind each other: texels and steps [maps][height][width]; reach and patches [maps][every level, the texels' first].
+// All maps behind each other (kernels/micro_patches.cl): texels, their edges' disparities, their reach and what is covered of them [maps][height][width]; the
+// patches above them and their reach [maps][above].
 struct PreparedUnion {
-    opencl::Buffer<cl_float2> texels, steps;
-    opencl::Buffer<float> reach; // the patches' greatest disparities
+    opencl::Buffer<cl_float2> texels;
+    opencl::Buffer<cl_float4> edges, parts; // no parts: texels are covered whole
+    opencl::Buffer<float> texel_reach, reach;
     opencl::Buffer<MicroPatch> patches;
     opencl::Buffer<cl_uint> light_rows; // which samples of the light shine
     int light_samples = 0;
     int maps = 0;
-    std::size_t per_map = 0; // patches
-    float nearest = 0;       // greatest disparity of all; 0: nothing casts
+    std::size_t above = 0; // patches of a map
+    float nearest = 0;     // greatest disparity of all; 0: nothing casts
 };
 
 // What the union is made from: planar depth maps, `from` texels each, used at `size`. `other`: of each map the number of the one that shows the other side of
