@@ -35,6 +35,7 @@ inline float3 point_of(const DepthSight sight, const int i, const float z)
 // clip_at_horizon: visibility becomes the smaller of what it is and the share of the light above the receiver's plane.
 //
 //   light                   in the receivers' camera's coordinates
+//   listed [pixels]         the receivers' pixels in the image that points, depth and normals are of; null: all of them, in their order
 //   points [pixels][3]      of receivers, z = 0: none; where has_points is 0, depth [pixels], planar, in the camera that `sight` describes
 //   normals [pixels][3]     0: not known
 //   textured                the light's parts are not alike: only what lies wholly below the plane is taken away
@@ -42,12 +43,13 @@ inline float3 point_of(const DepthSight sight, const int i, const float z)
 //
 // A technique's own shadow of the surface lies below the plane for the most part: the smaller of the two, not their sum.
 __kernel void clip_at_horizon(const DepthLight light, const DepthSight sight, const int has_points, const int textured, const int channels,
-                              __global const float* restrict points, __global const float* restrict depth, __global const float* restrict normals,
+                              __global const uint* restrict listed, __global const float* restrict points, __global const float* restrict depth, __global const float* restrict normals,
                               __global float* restrict visibility)
 {
     const int i = get_global_id(0);
     if (i >= light.count) return;
-    const float3 point = has_points ? vload3(i, points) : point_of(sight, i, depth[i]), normal = vload3(i, normals);
+    const int pixel = listed ? (int)listed[i] : i;
+    const float3 point = has_points ? vload3(pixel, points) : point_of(sight, pixel, depth[pixel]), normal = vload3(pixel, normals);
     if (!(point.z > 0.0f && point.z < MAXFLOAT) || dot(normal, normal) == 0.0f) return;
     const float3 half_u = (float3)(light.half_u[0], light.half_u[1], light.half_u[2]), half_v = (float3)(light.half_v[0], light.half_v[1], light.half_v[2]);
     float3 centre = (float3)(light.centre[0], light.centre[1], light.centre[2]);

@@ -60,27 +60,64 @@ __kernel void receivers_from_points(const ReceiverView view, __global const floa
     store_receiver(view, y * view.stride + x, there, p.x, p.y, p.z, xi, eta, d);
 }
 
-// receiver_planes: each receiver's own plane as the light's view shows it: how its disparity changes with xi and with eta. A plane n . p = c has
+// A receiver's own plane as the light's view shows it: how its disparity changes with xi and with eta. A plane n . p = c has
 // d = (n.x tx xi + n.y ty eta + n.z) / c there, with tx, ty the view's tangents.
 //
-//   normals [height][width][3]       of the receivers' surfaces, towards their camera, in the camera's coordinates; 0: not known
-//   slope_xi, slope_eta [rows][stride]  NO_PLANE in slope_xi: not known, or the light's centre does not see that side of the plane
+//   n            its surface's normal, towards the camera, in the camera's coordinates; 0: not known
+//   slope_xi     NO_PLANE: not known, or the light's centre does not see that side of the plane
+inline void store_plane(const ReceiverView view, const int at, const int there, const float3 n, __global const float* restrict xi, __global const float* restrict eta,
+                        __global const float* restrict d, __global float* restrict slope_xi, __global float* restrict slope_eta)
+{
+    const float nx = (view.light_from_camera[0] * n.x + view.light_from_camera[1] * n.y + view.light_from_camera[2] * n.z) / view.per_light_x;
+    const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
+    const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
+    // n . p over the receiver's depth: negative where the light's centre is before the plane.
+    const float facing = nx * xi[at] + ny * eta[at] + nz;
+    const bool known = there && d[at] != NO_RECEIVER && !view.light_orthographic && facing < -1e-4f;
+    slope_xi[at] = known ? nx * d[at] / facing : NO_PLANE;
+    slope_eta[at] = known ? ny * d[at] / facing : 0.0f;
+}
+
+// receiver_planes: store_plane of every receiver.
+//
+//   normals [height][width][3]
+//   slope_xi, slope_eta [rows][stride]
 __kernel void receiver_planes(const ReceiverView view, __global const float* restrict normals, __global const float* restrict xi,
                               __global const float* restrict eta, __global const float* restrict d, __global float* restrict slope_xi,
                               __global float* restrict slope_eta)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= view.stride || y >= view.rows) return;
-    const int at = y * view.stride + x;
     const float3 n = vload3(min(y, view.height - 1) * view.width + min(x, view.width - 1), normals);
-    const float nx = (view.light_from_camera[0] * n.x + view.light_from_camera[1] * n.y + view.light_from_camera[2] * n.z) / view.per_light_x;
-    const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
-    const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
-    // n . p over the receiver's depth: negative where the light's centre is before the plane.
-    const float facing = nx * xi[at] + ny * eta[at] + nz;
-    const bool known = x < view.width && y < view.height && d[at] != NO_RECEIVER && !view.light_orthographic && facing < -1e-4f;
-    slope_xi[at] = known ? nx * d[at] / facing : NO_PLANE;
-    slope_eta[at] = known ? ny * d[at] / facing : 0.0f;
+    store_plane(view, y * view.stride + x, x < view.width && y < view.height, n, xi, eta, d, slope_xi, slope_eta);
+}
+
+// receivers_of_pixels: what receivers_from_depth or receivers_from_points, and receiver_planes, say of some pixels of an image, as a list.
+//
+//   view              of the whole image
+//   pixels [count]    y width + x
+//   depth [height][width], or points [height][width][3], the other null; normals [height][width][3], null: planes are not known
+//   xi, eta, d, slope_xi, slope_eta [length]   the slopes null where normals are
+__kernel void receivers_of_pixels(const ReceiverView view, const int count, const int length, __global const uint* restrict pixels, __global const float* restrict depth,
+                                  __global const float* restrict points, __global const float* restrict normals, __global float* restrict xi, __global float* restrict eta,
+                                  __global float* restrict d, __global float* restrict slope_xi, __global float* restrict slope_eta)
+{
+    const int at = get_global_id(0);
+    if (at >= length) return;
+    const uint pixel = pixels[min(at, count - 1)];
+    bool there = at < count;
+    if (points) {
+        const float3 p = vload3(pixel, points);
+        store_receiver(view, at, there && p.z > 0.0f, p.x, p.y, p.z, xi, eta, d);
+    } else {
+        const float z = depth[pixel];
+        const int x = pixel % view.width, y = pixel / view.width;
+        const float spread = view.camera_orthographic ? 1.0f : z;
+        const float px = ((2 * x + 1 - view.width) * view.pixel_x + view.off_x) * spread;
+        const float py = ((view.height - 2 * y - 1) * view.pixel_y + view.off_y) * spread;
+        store_receiver(view, at, there && as_int(z) > 0 && as_int(z) < 0x7f800000, px, py, z, xi, eta, d);
+    }
+    if (normals) store_plane(view, at, there, vload3(pixel, normals), xi, eta, d, slope_xi, slope_eta);
 }
 
 inline float least(const float16 v)

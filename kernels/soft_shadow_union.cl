@@ -19,36 +19,34 @@
 // 1 / x to 2 units in the last place, x a positive normal number: a linear guess of the bits and three Newton steps, a third of a division's time.
 inline floatn reciprocal(const floatn x)
 {
-    floatn r = as_floatn((intn)(0x7ef311c7) - as_intn(x));
-    for (int step = 0; step < 3; ++step) r = fma(r, fma(-x, r, (floatn)(1.0f)), r);
-    return r;
+    const floatn guess = as_floatn((intn)(0x7ef311c7) - as_intn(x));
+    const floatn once = fma(guess, fma(-x, guess, (floatn)(1.0f)), guess), twice = fma(once, fma(-x, once, (floatn)(1.0f)), once);
+    return fma(twice, fma(-x, twice, (floatn)(1.0f)), twice);
 }
 
-// Where an edge lies in the light, in samples: 0 to SIDE, and up to one beyond.
+// Where an edge lies in the light, in samples: 0 to SIDE, what lies beyond at the end.
 inline floatn samples_at(const float edge, const floatn place, const floatn disparity, const floatn own, const floatn least, const float scale)
 {
     const floatn d = select_lanes(least, disparity, disparity > least);
     const floatn at = fma((edge - place) * scale, (float)SIDE * reciprocal(d - own), (floatn)(0.5f * SIDE));
-    const floatn low = select_lanes((floatn)(-1.0f), at, at > (floatn)(-1.0f));
-    return select_lanes((floatn)(SIDE + 1), low, low < (floatn)(SIDE + 1));
+    const floatn low = select_lanes((floatn)(0.0f), at, at > (floatn)(0.0f));
+    return select_lanes((floatn)(SIDE), low, low < (floatn)(SIDE));
 }
 
-// x rounded down, for x from -2^22 to 2^22.
-inline intn whole_below(const floatn x) { return -rounded_up(-x); }
-
-inline int lowest_of(const intn v)
+// The bits that any lane has.
+inline uint any_lane(const uintn v)
 {
 #if LANES == 1
     return v;
 #else
 #if LANES == 16
-    const int8 a = min(v.lo, v.hi);
+    const uint8 a = v.lo | v.hi;
 #else
-    const int8 a = v;
+    const uint8 a = v;
 #endif
-    const int4 b = min(a.lo, a.hi);
-    const int2 c = min(b.lo, b.hi);
-    return min(c.x, c.y);
+    const uint4 b = a.lo | a.hi;
+    const uint2 c = b.lo | b.hi;
+    return c.x | c.y;
 #endif
 }
 
@@ -68,29 +66,47 @@ inline floatn outermost(const float edge, const floatn place, const Along along,
     return samples_at(edge, place, d, own, least, scale);
 }
 
-// Sets what a rectangle hides from LANES receivers.
-inline void hide(uintn* bits, const Rectangle p, const float2 scale, const floatn xi, const floatn eta, const floatn d, const Limits limits)
+// LANES receivers, and what counts for them.
+typedef struct {
+    floatn xi, eta, d;
+    Limits limits;
+} Receivers;
+
+// Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity.
+inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2 scale, const Receivers* receivers)
 {
-    const floatn plane = fma((floatn)(0.5f * (p.a0 + p.a1)), limits.slope_xi, fma((floatn)(0.5f * (p.b0 + p.b1)), limits.slope_eta, limits.level));
-    const intn counts = (p.middle > limits.least) & (p.middle > plane);
-    const floatn v_bottom = outermost(p.b0, eta, p.bottom, true, d, limits.least, scale.y), v_top = outermost(p.b1, eta, p.top, false, d, limits.least, scale.y);
+    const floatn xi = receivers->xi, eta = receivers->eta, d = receivers->d, least = receivers->limits.least;
+    const floatn plane = fma((floatn)(0.5f * (p->a0 + p->a1)), receivers->limits.slope_xi, fma((floatn)(0.5f * (p->b0 + p->b1)), receivers->limits.slope_eta, receivers->limits.level));
+    const intn counts = (p->middle > least) & (p->middle > plane);
+    floatn v_bottom, v_top, u_left, u_right;
+    if (plain) {
+        v_bottom = samples_at(p->b0, eta, (floatn)(p->bottom.low), d, least, scale.y);
+        v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
+        u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
+        u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
+    } else {
+        v_bottom = outermost(p->b0, eta, p->bottom, true, d, least, scale.y);
+        v_top = outermost(p->b1, eta, p->top, false, d, least, scale.y);
+        u_left = outermost(p->a0, xi, p->left, true, d, least, scale.x);
+        u_right = outermost(p->a1, xi, p->right, false, d, least, scale.x);
+    }
     const floatn v0 = select_lanes(v_bottom, v_top, v_top < v_bottom), v1 = select_lanes(v_top, v_bottom, v_top < v_bottom);
-    const floatn u_left = outermost(p.a0, xi, p.left, true, d, limits.least, scale.x), u_right = outermost(p.a1, xi, p.right, false, d, limits.least, scale.x);
     const floatn u0 = select_lanes(u_left, u_right, u_right < u_left), u1 = select_lanes(u_right, u_left, u_right < u_left);
-    const intn some = counts & (u1 > (floatn)(0.0f)) & (u0 < (floatn)(SIDE)) & (v1 > (floatn)(0.0f)) & (v0 < (floatn)(SIDE)) & (u1 > u0) & (v1 > v0);
+    // Beside the light both ends are at one of its own.
+    const intn some = counts & (u1 > u0) & (v1 > v0);
     if (NONE(some)) return;
 
-    const intn from_column = in_64ths(select_lanes((floatn)(0.0f), u0, u0 > (floatn)(0.0f))), to_column = in_64ths(select_lanes((floatn)(SIDE), u1, u1 < (floatn)(SIDE)));
-    // Rows from -1 to SIDE; of the first and the last, some columns.
-    const intn first = whole_below(v0), last = whole_below(v1);
+    const From from = columns_from(in_64ths(u0)), beyond = columns_from(in_64ths(u1));
+    // Rows from 0 to SIDE; of the first and the last, some columns. Lanes that hide nothing have no rows.
+    const intn first = convert_intn(v0), last = convert_intn(v1);
     const uintn low = ~columns_in(v0 - convert_floatn(first)), high = columns_in(v1 - convert_floatn(last));
-    const int from = max(lowest_of(select_lanes((intn)(SIDE), first, some)), 0), to = min(-lowest_of(select_lanes((intn)(0), -last, some)), SIDE - 1);
-    const intn begin = select_lanes((intn)(SIDE), first, some);
-    for (int k = from; k <= to; ++k) {
-        uintn columns = columns_from(from_column, k) & ~columns_from(to_column, k);
-        columns &= select_lanes(select_lanes((uintn)(0u), (uintn)(0xffffffffu), begin < k), low, begin == k);
-        columns &= select_lanes(select_lanes((uintn)(0u), (uintn)(0xffffffffu), last > k), high, last == k);
-        bits[k] |= columns;
+    const uintn past = select_lanes((uintn)(0u), (uintn)(0xfffffffeu) << (as_uintn(last) & 31u), last < SIDE);
+    const uintn rows = select_lanes((uintn)(0u), ((uintn)(0xffffffffu) << (as_uintn(first) & 31u)) & ~past, some);
+    for (uint left = any_lane(rows); left != 0; left &= left - 1) {
+        const int k = 31 - (int)clz(left & (0u - left));
+        uintn columns = select_lanes((uintn)(0u), in_row(from, k) & ~in_row(beyond, k), (rows & (1u << k)) != 0u);
+        columns = select_lanes(columns, columns & low, first == k);
+        bits[k] |= select_lanes(columns, columns & high, last == k);
     }
 }
 
@@ -137,21 +153,33 @@ inline Rectangle rectangle_of_texel(const float middle, const float4 edges, cons
 }
 
 // Whether all of a patch counts for each of LANES receivers, or none of it.
-inline bool on_one_side(const MicroPatch p, const Rectangle r, const Limits limits)
+inline bool on_one_side(__global const MicroPatch* p, const Rectangle* r, const Limits* limits)
 {
-    const floatn middle = fma((floatn)(0.5f * (r.a0 + r.a1)), limits.slope_xi, fma((floatn)(0.5f * (r.b0 + r.b1)), limits.slope_eta, limits.level));
-    const floatn half_plane = fma(fabs(limits.slope_xi), (floatn)(0.5f * (r.a1 - r.a0)), fabs(limits.slope_eta) * (0.5f * (r.b1 - r.b0)));
+    const floatn middle = fma((floatn)(0.5f * (r->a0 + r->a1)), limits->slope_xi, fma((floatn)(0.5f * (r->b0 + r->b1)), limits->slope_eta, limits->level));
+    const floatn half_plane = fma(fabs(limits->slope_xi), (floatn)(0.5f * (r->a1 - r->a0)), fabs(limits->slope_eta) * (0.5f * (r->b1 - r->b0)));
     const floatn low = middle - half_plane, high = middle + half_plane;
-    const intn above = (p.least > limits.least) & (p.least > high), below = (p.reach <= limits.least) | (p.reach <= low);
+    const intn above = (p->least > limits->least) & (p->least > high), below = (p->reach <= limits->least) | (p->reach <= low);
     return ALL(above | below);
 }
 
-// Whether the penumbra of a cell may meet the box of a tile. x, y: of the level whose cells are so large.
-inline bool meets(const Search search, const float reach, const float2 cell, const int x, const int y)
+// Which of four cells' penumbrae may meet the box of a tile, a bit each. x, y: of the level whose cells are so large; reach: their greatest disparities.
+inline int meeting(const Search search, const float4 reach, const float2 cell, const int4 x, const int4 y)
 {
-    const float2 extent = penumbra_extent(search, reach);
-    return extent.x >= 0.0f && x * cell.x - 1.0f - extent.x <= search.box.s1 + cell.x * 0.0625f && (x + 1) * cell.x - 1.0f + extent.x >= search.box.s0 - cell.x * 0.0625f
-           && 1.0f - (y + 1) * cell.y - extent.y <= search.box.s3 + cell.y * 0.0625f && 1.0f - y * cell.y + extent.y >= search.box.s2 - cell.y * 0.0625f;
+    const float4 rise = reach - search.box.s4, extent_x = rise * search.half_inverse_scale.x, extent_y = rise * search.half_inverse_scale.y;
+    const float4 wide = fma((float4)(0x1p-20f), 1.0f + extent_x, extent_x), high = fma((float4)(0x1p-20f), 1.0f + extent_y, extent_y); // as penumbra_extent
+    const float4 left = convert_float4(x), top = convert_float4(y);
+    const int4 meets = (rise > 0.0f) & (left * cell.x - 1.0f - wide <= search.box.s1 + cell.x * 0.0625f) & ((left + 1.0f) * cell.x - 1.0f + wide >= search.box.s0 - cell.x * 0.0625f)
+                       & (1.0f - (top + 1.0f) * cell.y - high <= search.box.s3 + cell.y * 0.0625f) & (1.0f - top * cell.y + high >= search.box.s2 - cell.y * 0.0625f);
+    const int4 bits = meets & (int4)(1, 2, 4, 8);
+    return bits.s0 | bits.s1 | bits.s2 | bits.s3;
+}
+
+// The greatest disparities of a cell's four parts, left and right above, then below; 0 beyond the map.
+inline float4 reach_below(__global const float* reach, const int2 size, const int x, const int y)
+{
+    const int at = y * size.x + x;
+    const bool right = x + 1 < size.x, down = y + 1 < size.y;
+    return (float4)(reach[at], right ? reach[at + 1] : 0.0f, down ? reach[at + size.x] : 0.0f, right && down ? reach[at + size.x + 1] : 0.0f);
 }
 
 // Whether nothing is left to hide from LANES receivers.
@@ -207,7 +235,12 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                                0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
         uintn bits[ITEM_ROWS][SIDE];
         bool over[ITEM_ROWS]; // nothing is left to hide
+        Receivers own[ITEM_ROWS];
         for (int row = 0; row < together; ++row) {
+            const int place = (y + top + row) * receivers.stride + x;
+            own[row].xi = load_lanes(xi + place);
+            own[row].eta = load_lanes(eta + place);
+            own[row].d = load_lanes(d + place);
             for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(~light_rows[k]);
             over[row] = false;
         }
@@ -216,26 +249,24 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
         for (int map = 0; map < maps && rows_left > 0; ++map) {
             const int first_texel = map * size.x * size.y, first_patch = map * above;
-            Limits limits[ITEM_ROWS];
             bool has_limits = false;
             for (int root = roots.y * last_size.x; root < roots.w * last_size.x && rows_left > 0; ++root) {
                 if (root % last_size.x < roots.x || root % last_size.x >= roots.z) continue;
                 if (stopped(stop)) return;
-                // Depth first.
+                // Depth first, of what meets the box.
                 int3 cells[3 * PATCH_LEVELS + 1]; // x, y, level
-                int left = 1;
                 cells[0] = (int3)(root % last_size.x, root / last_size.x, PATCH_LEVELS);
+                const float root_reach = reach[first_patch + levels.begins[PATCH_LEVELS] + root];
+                int left = meeting(search, (float4)(root_reach, 0.0f, 0.0f, 0.0f), search.texel * (1 << PATCH_LEVELS), (int4)(cells[0].x), (int4)(cells[0].y)) & 1;
                 while (left > 0 && rows_left > 0) {
                     const int3 at = cells[--left];
                     const int number = (at.z == 0 ? first_texel : first_patch) + levels.begins[at.z] + at.y * levels.sizes[at.z].x + at.x;
                     const float2 cell = search.texel * (1 << at.z);
-                    if (!meets(search, at.z == 0 ? texel_reach[number] : reach[number], cell, at.x, at.y)) continue;
                     if (!has_limits) {
                         for (int row = 0; row < together; ++row) {
                             const int place = (y + top + row) * receivers.stride + x;
-                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, texels + first_texel, 0,
-                                                             load_lanes((has_planes ? slope_xi : d) + place), load_lanes((has_planes ? slope_eta : d) + place), load_lanes(xi + place),
-                                                             load_lanes(eta + place), load_lanes(d + place));
+                            own[row].limits = limits_with_planes(occluders, bias, precision, has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
+                                                                 load_lanes((has_planes ? slope_eta : d) + place), own[row].xi, own[row].eta, own[row].d);
                         }
                         has_limits = true;
                     }
@@ -250,31 +281,29 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                         const bool small = cell.x * scale.x <= coarse * over_receivers && cell.y * scale.y <= coarse * over_receivers && p->reach - p->least <= coarse * over_receivers;
                         whole = small || (p->flags & SOLID) || ((p->flags & FULL) && may_be_one(search, p->reach, p->least));
                         if (whole) {
-                            const MicroPatch patch = *p;
-                            rectangle = rectangle_of(patch, at.x, at.y, cell);
-                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(patch, rectangle, limits[row]);
+                            rectangle = rectangle_of(*p, at.x, at.y, cell);
+                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(p, &rectangle, &own[row].limits);
                         }
                     }
                     if (!whole) {
-                        for (int child = 0; child < 4; ++child) {
-                            const int3 to = (int3)(2 * at.x + (child & 1), 2 * at.y + (child >> 1), at.z - 1);
-                            if (to.x < levels.sizes[to.z].x && to.y < levels.sizes[to.z].y) cells[left++] = to;
-                        }
+                        const int level = at.z - 1, x0 = 2 * at.x, y0 = 2 * at.y;
+                        __global const float* const below = level == 0 ? texel_reach + first_texel : reach + first_patch + levels.begins[level];
+                        const int met = meeting(search, reach_below(below, levels.sizes[level], x0, y0), 0.5f * cell, (int4)(x0, x0 + 1, x0, x0 + 1), (int4)(y0, y0, y0 + 1, y0 + 1));
+                        for (int child = 0; child < 4; ++child)
+                            if (met & (1 << child)) cells[left++] = (int3)(x0 + (child & 1), y0 + (child >> 1), level);
                         continue;
                     }
                     count += together;
                     for (int row = 0; row < together; ++row) {
                         if (over[row]) continue;
-                        const int place = (y + top + row) * receivers.stride + x;
-                        const floatn own_d = load_lanes(d + place);
-                        hide(bits[row], rectangle, scale, load_lanes(xi + place), load_lanes(eta + place), own_d, limits[row]);
-                        if (at.z < 3 || !all_hidden(bits[row], own_d)) continue;
+                        hide(bits[row], &rectangle, at.z == 0, scale, &own[row]);
+                        if (at.z < 3 || !all_hidden(bits[row], own[row].d)) continue;
                         over[row] = true;
                         --rows_left;
                     }
                 }
                 for (int row = 0; row < together && has_limits; ++row)
-                    if (!over[row] && all_hidden(bits[row], load_lanes(d + (y + top + row) * receivers.stride + x))) {
+                    if (!over[row] && all_hidden(bits[row], own[row].d)) {
                         over[row] = true;
                         --rows_left;
                     }
@@ -282,8 +311,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         }
 
         for (int row = top; row < top + together && y + row < receivers.height; ++row) {
-            uintn hidden = (uintn)(0u);
-            for (int k = 0; k < SIDE; ++k) hidden += popcount(bits[row - top][k]);
+            const uintn hidden = samples_set(bits[row - top]);
             write_visibility(visibility + (y + row) * receivers.width + x, convert_floatn((uintn)(SIDE * SIDE) - hidden) * (1.0f / light_samples), receivers.width - x, 0);
         }
     }

@@ -33,7 +33,7 @@ DepthLight depth_light(const Light& light, const Camera& image, const Camera& re
 void clip_at_horizon(opencl::Work& work, const opencl::Specialisation& program, const Horizon& horizon, int channels, const cl::Buffer& visibility)
 {
     DepthLight seen = depth_light(horizon.light, horizon.camera, horizon.camera);
-    const std::size_t count = static_cast<std::size_t>(horizon.width) * static_cast<std::size_t>(horizon.height);
+    const std::size_t count = horizon.listed() ? horizon.listed_count : static_cast<std::size_t>(horizon.width) * static_cast<std::size_t>(horizon.height);
     seen.count = static_cast<int>(count);
     const auto* rectangle = std::get_if<RectangleLight>(&horizon.light);
     const DepthSight sight{.image_from_camera = {},
@@ -45,7 +45,7 @@ void clip_at_horizon(opencl::Work& work, const opencl::Specialisation& program, 
                            .height = horizon.height,
                            .orthographic = horizon.camera.orthographic};
     work.launch(program, "clip_at_horizon", {count, 1}, {64, 1}, count * 28, seen, sight, static_cast<cl_int>(horizon.points.get() != nullptr),
-                static_cast<cl_int>(rectangle && rectangle->emission), static_cast<cl_int>(channels), horizon.points, horizon.depth, horizon.normals,
+                static_cast<cl_int>(rectangle && rectangle->emission), static_cast<cl_int>(channels), horizon.listed, horizon.points, horizon.depth, horizon.normals,
                 visibility);
 }
 

@@ -16,12 +16,14 @@ DepthLight depth_light(const Light& light, const Camera& image, const Camera& re
 //
 //   points      [height][width] in the camera's coordinates, as DepthSurface has them; or `depth`, planar, in their place
 //   normals     [height][width] towards the camera; 0: not clipped
-//   visibility  [height][width][channels]
+//   visibility  [height][width][channels], or [listed_count][channels] of the pixels that are listed
 struct Horizon {
     const Light& light;
     Camera camera;
     int width, height;
     cl::Buffer points, depth, normals;
+    cl::Buffer listed = {}; // uint y width + x; none: all pixels
+    std::size_t listed_count = 0;
 };
 // `program`: any that has horizon.cl, as every technique's on the device does.
 void clip_at_horizon(opencl::Work& work, const opencl::Specialisation& program, const Horizon& horizon, int channels, const cl::Buffer& visibility);

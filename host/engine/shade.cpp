@@ -133,13 +133,16 @@ opencl::Specialisation program_of(const PreparedTechnique& data)
 void clip(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, const cl::Buffer& visibility)
 {
     work.stage("clip at horizon");
+    const PixelList* list = receivers.listed;
     const Horizon horizon{.light = state.light,
                           .camera = receivers.camera,
-                          .width = receivers.width,
-                          .height = receivers.height,
+                          .width = list ? list->width : receivers.width,
+                          .height = list ? list->height : receivers.height,
                           .points = receivers.device_points ? receivers.device_points->memory() : cl::Buffer(),
                           .depth = receivers.device_depth,
-                          .normals = receivers.normals->memory()};
+                          .normals = receivers.normals->memory(),
+                          .listed = list ? list->pixels.memory() : cl::Buffer(),
+                          .listed_count = list ? list->count() : 0};
     clip_at_horizon(work, program_of(state.data), horizon, state.channels, visibility);
 }
 
@@ -154,39 +157,60 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const DepthMap&
     return image;
 }
 
+// Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
+bool clips_at_horizon(const Prepared::State& state, const ToShade& receivers)
+{
+    return receivers.normals && !(needs_of(state.technique).depth_images && receivers.surface) && !row_of(kind_of(state.technique)).on_host;
+}
+
+// Receivers on the device.
+struct DeviceWhole {
+    opencl::Buffer<DepthVector> normals, points;
+    opencl::Buffer<float> depth;
+    bool has_points = false, has_normals = false;
+};
+DeviceWhole on_device(opencl::Work& work, const Prepared::State& state, const ToShade& receivers)
+{
+    DeviceWhole whole;
+    if (row_of(kind_of(state.technique)).on_host) return whole;
+    work.stage("upload receivers");
+    const std::vector<DepthVector>* points = receivers.surface ? &receivers.surface->points : receivers.chosen ? &receivers.chosen->points : nullptr;
+    whole.has_points = points != nullptr;
+    whole.has_normals = clips_at_horizon(state, receivers);
+    if (points)
+        whole.points = work.lend(std::span<const DepthVector>(*points), "receiver points");
+    else
+        whole.depth = work.lend(std::span<const float>(receivers.depth.depth), "receiver depth");
+    if (whole.has_normals) whole.normals = work.lend(std::span<const DepthVector>(*receivers.normals), "receiver normals");
+    return whole;
+}
+
+Receiving receiving(const Prepared::State& state, const ToShade& receivers, const DeviceWhole& whole)
+{
+    return {.camera = receivers.camera,
+            .width = receivers.depth.width,
+            .height = receivers.depth.height,
+            .depth = &receivers.depth,
+            .device_depth = whole.depth.memory(),
+            .device_points = whole.has_points ? &whole.points : nullptr,
+            .surface = receivers.surface,
+            .chosen = receivers.chosen,
+            .listed = nullptr,
+            .normals = whole.has_normals ? &whole.normals : nullptr,
+            .view = state.light_view,
+            .from_light = receivers.from_light};
+}
+
 // The technique's mask of the receivers, clipped at their planes.
 Image shade_image(opencl::Work& work, const Prepared::State& state, const ToShade& receivers, Shaded& shaded)
 {
-    const bool on_host = row_of(kind_of(state.technique)).on_host;
-    // Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
-    const bool clips = receivers.normals && !(needs_of(state.technique).depth_images && receivers.surface) && !on_host;
-    const std::vector<DepthVector>* listed = receivers.surface ? &receivers.surface->points : receivers.chosen ? &receivers.chosen->points : nullptr;
-    opencl::Buffer<DepthVector> normals, points;
-    opencl::Buffer<float> depth;
-    if (!on_host) {
-        work.stage("upload receivers");
-        if (listed)
-            points = work.lend(std::span<const DepthVector>(*listed), "receiver points");
-        else
-            depth = work.lend(std::span<const float>(receivers.depth.depth), "receiver depth");
-        if (clips) normals = work.lend(std::span<const DepthVector>(*receivers.normals), "receiver normals");
-    }
-    const Receiving receiving{.camera = receivers.camera,
-                              .width = receivers.depth.width,
-                              .height = receivers.depth.height,
-                              .depth = &receivers.depth,
-                              .device_depth = depth.memory(),
-                              .device_points = listed ? &points : nullptr,
-                              .surface = receivers.surface,
-                              .chosen = receivers.chosen,
-                              .normals = clips ? &normals : nullptr,
-                              .view = state.light_view,
-                              .from_light = receivers.from_light};
+    const DeviceWhole whole = on_device(work, state, receivers);
+    const Receiving all = receiving(state, receivers, whole);
     opencl::Buffer<float> visibility;
-    if (!on_host) visibility = work.buffer<float>(receivers.depth.depth.size() * static_cast<std::size_t>(state.channels), "visibility");
+    if (!row_of(kind_of(state.technique)).on_host) visibility = work.buffer<float>(receivers.depth.depth.size() * static_cast<std::size_t>(state.channels), "visibility");
     shaded.visibility = visibility.memory();
-    shade_technique(work, state, receiving, shaded);
-    if (clips && visibility) clip(work, state, receiving, visibility.memory());
+    shade_technique(work, state, all, shaded);
+    if (all.normals && visibility) clip(work, state, all, visibility.memory());
     return image_of(work, state, receivers.depth, visibility, shaded);
 }
 
@@ -228,6 +252,43 @@ private:
     }
 };
 
+// Some pixels of the whole, for techniques that work on the host or on points from there.
+std::vector<float> shade_on_host(opencl::Work& work, const Prepared::State& state, const ToShade& whole, std::span<const std::uint32_t> pixels, Shaded& shaded)
+{
+    const ReceiverList list(whole, pixels);
+    const ChosenReceivers chosen{.pixels = pixels, .depth = whole.depth, .surface = whole.surface, .points = list.points};
+    return shade_image(work, state,
+                       {.camera = whole.camera,
+                        .depth = list.depth,
+                        .surface = whole.surface ? &list.surface : nullptr,
+                        .normals = whole.normals ? &list.normals : nullptr,
+                        .chosen = &chosen},
+                       shaded)
+        .pixels;
+}
+
+// Some pixels of what is on the device. In one stage: nothing waits for the device before the visibility is read.
+std::vector<float> shade_on_device(opencl::Work& work, const Prepared::State& state, const Receiving& whole, std::span<const std::uint32_t> pixels, Shaded& shaded)
+{
+    work.stage("shade");
+    const opencl::Work::OneStage one(work);
+    const opencl::Buffer<cl_uint> numbers = work.lend(pixels, "receivers' pixels");
+    const PixelList list{.pixels = numbers, .width = whole.width, .height = whole.height};
+    Receiving listed = whole;
+    listed.width = TILE_WIDTH;
+    listed.height = list.rows();
+    listed.listed = &list;
+    const auto visibility = work.buffer<float>(list.length() * static_cast<std::size_t>(state.channels), "visibility");
+    shaded.visibility = visibility.memory();
+    shade_technique(work, state, listed, shaded);
+    if (whole.normals) clip(work, state, listed, visibility.memory());
+    std::vector<float> values = work.read(visibility);
+    if (!has_emission(state.light) || state.channels != 1) return values;
+    Image grey{.width = listed.width, .height = listed.height, .channels = 1, .pixels = std::move(values)};
+    make_grey(grey);
+    return std::move(grey.pixels);
+}
+
 // Shades coarse to fine, within the technique's tolerance.
 Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade& whole, Shaded& shaded, Report& report)
 {
@@ -237,29 +298,25 @@ Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade
                               .depth = whole.depth.depth,
                               .points = whole.surface ? std::span<const DepthVector>(whole.surface->points) : std::span<const DepthVector>{},
                               .normals = whole.normals ? std::span<const DepthVector>(*whole.normals) : std::span<const DepthVector>{}};
-    ShadeCounts all;
+    const Needs needs = needs_of(state.technique);
+    const bool from_host = row_of(kind_of(state.technique)).on_host || needs.depth_images;
+    const DeviceWhole uploaded = from_host ? DeviceWhole{} : on_device(work, state, whole);
+    const Receiving all = receiving(state, whole, uploaded);
+    ShadeCounts counted;
     const auto shade_list = [&](std::span<const std::uint32_t> pixels) {
-        const ReceiverList list(whole, pixels);
-        const ChosenReceivers chosen{.pixels = pixels, .depth = whole.depth, .surface = whole.surface, .points = list.points};
         ShadeCounts counts;
-        Shaded one{.visibility = {}, .image = {}, .counts = shaded.counts ? &counts : nullptr, .estimated = shaded.estimated, .bound = nullptr};
-        const Image values = shade_image(work, state,
-                                         {.camera = whole.camera,
-                                          .depth = list.depth,
-                                          .surface = whole.surface ? &list.surface : nullptr,
-                                          .normals = whole.normals ? &list.normals : nullptr,
-                                          .chosen = &chosen},
-                                         one);
-        all += counts;
+        Shaded some{.visibility = {}, .image = {}, .counts = shaded.counts ? &counts : nullptr, .estimated = shaded.estimated, .bound = nullptr};
+        std::vector<float> values = from_host ? shade_on_host(work, state, whole, pixels, some) : shade_on_device(work, state, all, pixels, some);
+        counted += counts;
         work.stage("choose receivers");
-        return values.pixels;
+        return values;
     };
     work.stage("choose receivers");
     const int channels = has_emission(state.light) ? 3 : state.channels;
-    CoarseToFine result = shade_coarse_to_fine(image, channels, needs_of(state.technique).tolerance, *state.field, shade_list);
+    CoarseToFine result = shade_coarse_to_fine(image, channels, {.tolerance = needs.tolerance, .proves_lit = needs.maps_tell_all}, *state.field, shade_list);
     report.receivers = result.receivers;
     report.receivers_shaded = result.shaded;
-    if (shaded.counts) *shaded.counts = all;
+    if (shaded.counts) *shaded.counts = counted;
     return {.width = image.width, .height = image.height, .channels = channels, .pixels = std::move(result.visibility)};
 }
 
@@ -335,7 +392,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
 
     opencl::Work work(state.device->get(), queue);
     work.stage("shade");
-    const Receiving receiving{.camera =
+    const Receiving given{.camera =
                                   resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera"),
                               .width = receivers.width,
                               .height = receivers.height,
@@ -344,11 +401,12 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
                               .device_points = nullptr,
                               .surface = nullptr,
                               .chosen = nullptr,
+                              .listed = nullptr,
                               .normals = nullptr,
                               .view = state.light_view,
                               .from_light = {}};
     Shaded shaded{.visibility = cl::Buffer(visibility, true), .image = {}, .counts = nullptr, .estimated = {}, .bound = nullptr};
-    shade_technique(work, state, receiving, shaded);
+    shade_technique(work, state, given, shaded);
     work.finish();
 }
 

@@ -138,6 +138,24 @@ Work::Work(std::shared_ptr<const Context> context, cl_command_queue queue) : con
     });
 }
 
+Work::~Work()
+{
+    if (later_.empty()) return;
+    try {
+        queue_.finish(); // it writes to what they keep
+    } catch (...) {
+        // A queue that cannot be waited for runs nothing more.
+    }
+}
+
+cl::Kernel Work::kernel(const Specialisation& specialisation, const char* name)
+{
+    const auto same = [&](const OwnKernel& one) { return one.name == name && one.file == specialisation.file && one.constants == specialisation.constants; };
+    const auto at = std::find_if(kernels_.begin(), kernels_.end(), same);
+    if (at != kernels_.end()) return at->kernel;
+    return kernels_.emplace_back(specialisation.file, name, specialisation.constants, context().kernel(specialisation, name, compile_ms_)).kernel;
+}
+
 Work::StopBuffer::~StopBuffer()
 {
     try {
@@ -250,11 +268,33 @@ void Work::read(const cl::Buffer& memory, void* data, std::size_t bytes, std::si
         if (bytes > 0) queue_.enqueueReadBuffer(memory, CL_TRUE, offset, bytes, data, nullptr, new_event());
         stages_[current_].bytes += bytes;
         check_stop();
+        use_read();
         if (!context_->canaries) return;
         if (const auto guarded = context_->ledger()->watched(memory)) {
             if (const auto violation = canary_violation(queue_, *guarded)) throw Error(ErrorCode::internal, *violation);
         }
     });
+}
+
+void Work::read_later(const cl::Buffer& memory, void* data, std::size_t bytes, std::function<void()> use)
+{
+    ensure_stage();
+    if (bytes > 0)
+        translated("reading back " + bytes_text(bytes), [&] {
+            later_.push_back(std::move(use));
+            queue_.enqueueReadBuffer(memory, CL_FALSE, 0, bytes, data, nullptr, new_event());
+        });
+    stages_[current_].bytes += bytes;
+    if (!own_queue_) {
+        queue_.finish();
+        use_read();
+    }
+}
+
+// The queue is in order: what was asked for before the last wait is there.
+void Work::use_read()
+{
+    for (const auto& use : std::exchange(later_, {})) use();
 }
 
 void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
@@ -266,11 +306,12 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
     if (global[0] == 0 || global[1] == 0) return;
     ensure_stage();
     try {
-        check_limits(*context_, kernel, name, local);
+        const bool known = std::any_of(launched_.begin(), launched_.end(), [&](const Launched& one) { return one.kernel == kernel() && one.local == local; });
+        if (!known) check_limits(*context_, kernel, name, local);
 
         // Drivers compile for the work-group's shape at the first launch. On a queue of our own that is told from the work by waiting for
         // it.
-        const bool first = own_queue_ && context_->first_launch(kernel, name, local);
+        const bool first = !known && own_queue_ && context_->first_launch(kernel, name, local);
         if (first) queue_.finish();
         const Quirks& quirks = context_->quirks();
         std::optional<RecordingIfSlow> recording;
@@ -282,6 +323,8 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
             else
                 context_->unrecorded = true;
         }
+        const bool own = std::any_of(kernels_.begin(), kernels_.end(), [&](const OwnKernel& one) { return one.kernel() == kernel(); });
+        if (!known && own) launched_.push_back({kernel(), local});
         const Clock::time_point start = Clock::now();
         queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(whole[0], whole[1]), cl::NDRange(local[0], local[1]), nullptr,
                                     new_event());
@@ -320,6 +363,7 @@ cl::Event* Work::new_event()
 
 void Work::stage(const char* name)
 {
+    if (held_ > 0) return;
     end_stage();
     const auto at = std::find_if(stages_.begin(), stages_.end(), [name](const Stage& stage) { return stage.name == name; });
     current_ = static_cast<std::size_t>(at - stages_.begin());
@@ -343,7 +387,10 @@ void Work::end_stage()
 {
     if (!running_) return;
     running_ = false;
-    if (own_queue_ && context_) translated("stage " + stages_[current_].name, [&] { queue_.finish(); });
+    if (own_queue_ && context_) translated("stage " + stages_[current_].name, [&] {
+            queue_.finish();
+            use_read();
+        });
     stages_[current_].ms += std::max(0.0, milliseconds_since(started_) - compile_ms_);
     total_compile_ms_ += std::exchange(compile_ms_, 0.0);
 }

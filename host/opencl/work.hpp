@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -48,6 +49,9 @@ public:
     explicit Work(std::shared_ptr<const Context> context);                // on a queue of its own
     explicit Work(std::shared_ptr<const LateContext> late);               // the same, once something needs the device
     Work(std::shared_ptr<const Context> context, cl_command_queue queue); // on the caller's; nothing here then waits for the device
+    ~Work();
+    Work(const Work&) = delete;
+    Work& operator=(const Work&) = delete;
 
     const Context& context()
     {
@@ -90,6 +94,13 @@ public:
         return data;
     }
 
+    // The same when the device is next waited for: `use` gets the elements then. Nothing is waited for now.
+    template <class T, class Use> void read_later(const Buffer<T>& buffer, Use use)
+    {
+        auto data = std::make_shared<std::vector<T>>(buffer.count());
+        read_later(buffer.memory(), data->data(), buffer.bytes(), [data, use = std::move(use)] { use(*data); });
+    }
+
     // All of `from` to where `to` has its element `first`.
     template <class T> void copy(const Buffer<T>& from, const Buffer<T>& to, std::size_t first) { copy(from.memory(), to.memory(), from.bytes(), first * sizeof(T)); }
 
@@ -101,7 +112,7 @@ public:
                                          std::array<std::size_t, 2> local, std::uint64_t bytes, const Args&... args)
     {
         ensure_stage();
-        launch(context().kernel(specialisation, kernel, compile_ms_), kernel, global, local, bytes, args...);
+        launch(this->kernel(specialisation, kernel), kernel, global, local, bytes, args...);
     }
     // The same for a kernel object that nobody else uses.
     template <class... Args> void launch(cl::Kernel kernel, const char* name, std::array<std::size_t, 2> global,
@@ -115,6 +126,18 @@ public:
     // Ends the running stage (waits for the device, unless the queue is the caller's) and starts one called `name`. Stages of the same name
     // are joined. What a stage spends building programs is taken out of it and reported as the stage "compile".
     void stage(const char* name);
+    // While it lives the running stage goes on, whatever stage() says: what is called meanwhile then waits for the device nowhere.
+    class OneStage {
+    public:
+        explicit OneStage(Work& work) : work_(work) { ++work_.held_; }
+        ~OneStage() { --work_.held_; }
+        OneStage(const OneStage&) = delete;
+        OneStage& operator=(const OneStage&) = delete;
+
+    private:
+        Work& work_;
+    };
+
     // Counts bytes that the running stage moved on the host.
     void moved(std::uint64_t bytes);
     // Ends the last stage and returns all; the next stage starts afresh. On the caller's queue device_ms is 0 for stages that are still
@@ -142,6 +165,9 @@ private:
     void write(const cl::Buffer& memory, const void* data, std::size_t bytes);
     void copy(const cl::Buffer& from, const cl::Buffer& to, std::size_t bytes, std::size_t offset);
     void read(const cl::Buffer& memory, void* data, std::size_t bytes, std::size_t offset);
+    void read_later(const cl::Buffer& memory, void* data, std::size_t bytes, std::function<void()> use);
+    void use_read(); // what read_later asked for, once the device was waited for
+    cl::Kernel kernel(const Specialisation& specialisation, const char* name); // one of this work's own
     void enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t, 2> global, std::array<std::size_t, 2> local,
                  std::uint64_t bytes);
 
@@ -182,6 +208,19 @@ private:
     std::unique_ptr<StopBuffer> stop_buffer_;
     std::shared_ptr<MemoryMeter> memory_ = std::make_shared<MemoryMeter>();
     double compile_ms_ = 0, total_compile_ms_ = 0;
+    std::vector<std::function<void()>> later_; // what read_later keeps until then
+    struct OwnKernel {
+        std::string file, name;
+        std::vector<std::pair<std::string, std::string>> constants;
+        cl::Kernel kernel;
+    };
+    std::vector<OwnKernel> kernels_;
+    struct Launched {
+        cl_kernel kernel;
+        std::array<std::size_t, 2> local;
+    };
+    std::vector<Launched> launched_; // that need no more checks
+    int held_ = 0;
     std::vector<Stage> stages_;
     std::vector<std::pair<std::size_t, cl::Event>> events_; // stage index, event
     std::size_t current_ = 0;

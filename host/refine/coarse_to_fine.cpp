@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <cmath>
 #include <limits>
 
@@ -11,12 +14,14 @@
 
 namespace penumbra {
 namespace {
+static double tick(){return std::chrono::duration<double,std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();}
 
-constexpr int coarsest = 16;         // pixels along a block's side
+constexpr int coarsest = 32;         // pixels along a block's side
 constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
 constexpr float turned = 0.15f;      // how far its normals may turn, in radians
 constexpr double most_passed = 0.1; // of the light, from one shaded receiver to the next
-constexpr std::size_t many_blocks = 128; // that a thread takes at once
+constexpr std::size_t many_blocks = 8, many_kept = 128; // that a thread takes at once
+constexpr std::size_t few_groups = 4; // threads take longer to start than these
 constexpr int rows_together = 64;
 
 // A block of receivers, its last column and row included: neighbours share theirs.
@@ -28,13 +33,15 @@ struct Block {
 };
 
 // What a block is before anything of it is shaded.
-enum class BlockKind : std::uint8_t { empty, divided, asked };
+enum class BlockKind : std::uint8_t { lit, divided, asked }; // lit, or empty
 
 class Shading {
 public:
-    Shading(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade)
-        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(tolerance)), field_(field), shade_(shade)
+    Shading(const ReceiverImage& receivers, int channels, const Coarse& coarse, const OccluderField& field, const ShadePixels& shade)
+        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(coarse.tolerance)), proves_lit_(coarse.proves_lit && !receivers.normals.empty()),
+          field_(field), shade_(shade)
     {
+        made_=tick();
         const std::size_t count = static_cast<std::size_t>(receivers.width) * static_cast<std::size_t>(receivers.height);
         result_.visibility.assign(count * channels_, 1.f);
         known_.assign(count, 0);
@@ -48,12 +55,31 @@ public:
     CoarseToFine run()
     {
         std::vector<Block> blocks = roots(), kept;
+        double ta=0,tk=0,tt=0,t0=tick(),t00=t0;int rounds=0;
         while (!blocks.empty()) {
-            const std::vector<BlockKind> kinds = kinds_of(blocks);
-            ask(blocks, kinds);
-            blocks = divided(blocks, kinds, kept);
+            ++rounds;double t1=tick();tt+=t1-t0;
+            const std::vector<Block> asked = asked_of(blocks);
+            double t2=tick();ta+=t2-t1;
+            ask(asked);
+            t0=tick();tk+=t0-t2;
+            blocks.clear();
+            for (const Block& block : asked) {
+                if (block.whole()) continue;
+                if (told(block)) {
+                    kept.push_back(block);
+                } else {
+                    const Parts parts = parts_of(block);
+                    blocks.insert(blocks.end(), parts.blocks.begin(), parts.blocks.begin() + parts.count);
+                }
+            }
         }
-        for_each(kept, [&](std::size_t i) { interpolate(kept[i]); });
+        double t3=tick();tt+=t3-t0;
+        parallel_for(static_cast<int>((kept.size() + many_kept - 1) / many_kept), [&](int group) {
+            const std::size_t begin = static_cast<std::size_t>(group) * many_kept;
+            for (std::size_t i = begin; i < std::min(kept.size(), begin + many_kept); ++i) interpolate(kept[i]);
+        });
+        double t4=tick();
+        if(getenv("TICK"))fprintf(stderr,"init %.2f kinds %.2f ask %.2f told %.2f fill %.2f rounds %d\n",t00-made_,ta,tk,tt,t4-t3,rounds);
         std::uint64_t count = 0;
         for (const float nearness : nearness_) count += nearness != 0;
         result_.receivers = count;
@@ -86,29 +112,40 @@ private:
         return blocks;
     }
 
-    template <class Body> static void for_each(const std::vector<Block>& blocks, const Body& body)
+    // The blocks to be shaded: divided as far as the receivers and what casts on them want it. One launch then shades all of them.
+    std::vector<Block> asked_of(const std::vector<Block>& blocks) const
     {
-        const auto some = [&](std::size_t from) {
-            for (std::size_t i = from; i < std::min(blocks.size(), from + many_blocks); ++i) body(i);
+        const std::size_t groups = (blocks.size() + many_blocks - 1) / many_blocks;
+        std::vector<std::vector<Block>> parts(groups);
+        const auto group = [&](std::size_t number) {
+            for (std::size_t i = number * many_blocks; i < std::min(blocks.size(), (number + 1) * many_blocks); ++i) add_asked(blocks[i], parts[number]);
         };
-        // Threads take longer to start than a few blocks.
-        if (blocks.size() <= 2 * many_blocks)
-            for (std::size_t from = 0; from < blocks.size(); from += many_blocks) some(from);
+        if (groups < few_groups)
+            for (std::size_t i = 0; i < groups; ++i) group(i);
         else
-            parallel_for(static_cast<int>((blocks.size() + many_blocks - 1) / many_blocks), [&](int group) { some(static_cast<std::size_t>(group) * many_blocks); });
+            parallel_for(static_cast<int>(groups), [&](int i) { group(static_cast<std::size_t>(i)); });
+        std::vector<Block> asked;
+        for (const std::vector<Block>& part : parts) asked.insert(asked.end(), part.begin(), part.end());
+        return asked;
     }
 
-    std::vector<BlockKind> kinds_of(const std::vector<Block>& blocks) const
+    void add_asked(const Block& block, std::vector<Block>& asked) const
     {
-        std::vector<BlockKind> kinds(blocks.size());
-        for_each(blocks, [&](std::size_t i) {
-            const Block& block = blocks[i];
-            if (empty(block))
-                kinds[i] = BlockKind::empty;
-            else
-                kinds[i] = block.whole() || (smooth(block) && resolved(block)) ? BlockKind::asked : BlockKind::divided;
-        });
-        return kinds;
+        const BlockKind kind = kind_of(block);
+        if (kind == BlockKind::asked) asked.push_back(block);
+        if (kind != BlockKind::divided) return;
+        const Parts parts = parts_of(block);
+        for (int i = 0; i < parts.count; ++i) add_asked(parts.blocks[static_cast<std::size_t>(i)], asked);
+    }
+
+    BlockKind kind_of(const Block& block) const
+    {
+        if (empty(block)) return BlockKind::lit;
+        if (!smooth(block)) return block.whole() ? BlockKind::asked : BlockKind::divided;
+        const Corners corners = corners_of(block);
+        const Passing passing = field_.passing(patch_of(block, corners), most_passed);
+        if (passing == Passing::nothing && proves_lit_ && faces_light(block, corners)) return BlockKind::lit;
+        return passing != Passing::much || block.whole() ? BlockKind::asked : BlockKind::divided;
     }
 
     bool empty(const Block& block) const
@@ -138,27 +175,43 @@ private:
         return receivers_.normals.empty() || turns_little(block);
     }
 
+    // Every fourth normal and the last: what turns across a straight crease turns at a corner, and curved surfaces turn everywhere.
     bool turns_little(const Block& block) const
     {
         const DepthVector& first = receivers_.normals[at(block.x0, block.y0)];
-        for (int y = block.y0; y <= block.y1; ++y) {
-            const DepthVector* row = receivers_.normals.data() + at(block.x0, y);
-            int off = 0;
-            for (int x = 0; x <= block.x1 - block.x0; ++x) {
-                const float dx = row[x].x - first.x, dy = row[x].y - first.y, dz = row[x].z - first.z;
-                off += !(dx * dx + dy * dy + dz * dz <= turned * turned);
-            }
-            if (off > 0) return false;
-        }
-        return true;
+        const auto turns = [&](int x, int y) {
+            const DepthVector& n = receivers_.normals[at(x, y)];
+            const float dx = n.x - first.x, dy = n.y - first.y, dz = n.z - first.z;
+            return !(dx * dx + dy * dy + dz * dz <= turned * turned);
+        };
+        const auto row_turns = [&](int y) {
+            for (int x = block.x0; x < block.x1; x += 4)
+                if (turns(x, y)) return true;
+            return turns(block.x1, y);
+        };
+        for (int y = block.y0; y < block.y1; y += 4)
+            if (row_turns(y)) return false;
+        return !row_turns(block.y1);
     }
 
-    LightPoint light_point(int x, int y) const
+    // The corners of a block in the world: two of its first row, then two of its last.
+    using Corners = std::array<Vec3, 4>;
+    Corners corners_of(const Block& block) const { return {world(block.x0, block.y0), world(block.x1, block.y0), world(block.x0, block.y1), world(block.x1, block.y1)}; }
+
+    Vec3 world(int x, int y) const
     {
         const std::size_t pixel = at(x, y);
-        if (receivers_.points.empty()) return field_.point(world_point(receivers_.camera, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth_at(pixel)));
+        if (receivers_.points.empty()) return world_point(receivers_.camera, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth_at(pixel));
         const DepthVector& p = receivers_.points[pixel];
-        return field_.point(world_from_camera(receivers_.camera, Vec3(p.x, p.y, p.z)));
+        return world_from_camera(receivers_.camera, Vec3(p.x, p.y, p.z));
+    }
+
+    // Whether all of the light lies above the receivers' own surface.
+    bool faces_light(const Block& block, const Corners& corners) const
+    {
+        const DepthVector& n = receivers_.normals[at(block.x0, block.y0)];
+        const Vec3 normal = world_from_camera(receivers_.camera, Vec3(n.x, n.y, n.z)) - receivers_.camera.frame.origin;
+        return std::all_of(corners.begin(), corners.end(), [&](const Vec3& corner) { return field_.all_above(corner, normal, turned); });
     }
 
     // Of the way between two corners, a step is `part`.
@@ -170,10 +223,9 @@ private:
         patch.step_z = std::max(patch.step_z, std::abs(b.z - a.z) * part);
     }
 
-    // Whether nothing passes unseen between the block's shaded receivers.
-    bool resolved(const Block& block) const
+    ReceiverPatch patch_of(const Block& block, const Corners& corners) const
     {
-        ReceiverPatch patch{.corners = {light_point(block.x0, block.y0), light_point(block.x1, block.y0), light_point(block.x0, block.y1), light_point(block.x1, block.y1)}};
+        ReceiverPatch patch{.corners = {field_.point(corners[0]), field_.point(corners[1]), field_.point(corners[2]), field_.point(corners[3])}};
         const float least = nearness_[at(block.x0, block.y0)];
         patch.off = flat * pixel_ * (receivers_.camera.orthographic ? 1 : 1 / static_cast<double>(least));
         const double part_x = static_cast<double>(block.x1 - block.middle_x()) / (block.x1 - block.x0), part_y = static_cast<double>(block.y1 - block.middle_y()) / (block.y1 - block.y0);
@@ -185,11 +237,11 @@ private:
             widen(patch, 0, 2, part_y);
             widen(patch, 1, 3, part_y);
         }
-        return field_.resolves(patch, most_passed);
+        return patch;
     }
 
     // Shades what blocks ask for and nobody asked for yet.
-    void ask(const std::vector<Block>& blocks, const std::vector<BlockKind>& kinds)
+    void ask(const std::vector<Block>& blocks)
     {
         std::vector<std::uint32_t> pixels;
         const auto add = [&](int x, int y) {
@@ -198,9 +250,7 @@ private:
             known_[pixel] = 1;
             pixels.push_back(static_cast<std::uint32_t>(pixel));
         };
-        for (std::size_t i = 0; i < blocks.size(); ++i) {
-            if (kinds[i] != BlockKind::asked) continue;
-            const Block& block = blocks[i];
+        for (const Block& block : blocks) {
             for (const int y : {block.y0, block.middle_y(), block.y1})
                 for (const int x : {block.x0, block.middle_x(), block.x1}) add(x, y);
         }
@@ -229,23 +279,20 @@ private:
         return true;
     }
 
-    // The parts of the blocks that are to be divided; the others are kept.
-    std::vector<Block> divided(const std::vector<Block>& blocks, const std::vector<BlockKind>& kinds, std::vector<Block>& kept) const
+    struct Parts {
+        std::array<Block, 4> blocks{};
+        int count = 0;
+    };
+    static Parts parts_of(const Block& block)
     {
-        std::vector<Block> parts;
-        for (std::size_t i = 0; i < blocks.size(); ++i) {
-            const Block& block = blocks[i];
-            if (kinds[i] != BlockKind::divided && (kinds[i] == BlockKind::empty || block.whole() || told(block))) {
-                if (kinds[i] == BlockKind::asked && !block.whole()) kept.push_back(block);
-                continue;
-            }
-            const int x = block.middle_x(), y = block.middle_y();
-            const bool wide = block.x1 - block.x0 > 1, high = block.y1 - block.y0 > 1;
-            parts.push_back({block.x0, block.y0, wide ? x : block.x1, high ? y : block.y1});
-            if (wide) parts.push_back({x, block.y0, block.x1, high ? y : block.y1});
-            if (high) parts.push_back({block.x0, y, wide ? x : block.x1, block.y1});
-            if (wide && high) parts.push_back({x, y, block.x1, block.y1});
-        }
+        const int x = block.middle_x(), y = block.middle_y();
+        const bool wide = block.x1 - block.x0 > 1, high = block.y1 - block.y0 > 1;
+        Parts parts;
+        const auto add = [&](const Block& part) { parts.blocks[static_cast<std::size_t>(parts.count++)] = part; };
+        add({block.x0, block.y0, wide ? x : block.x1, high ? y : block.y1});
+        if (wide) add({x, block.y0, block.x1, high ? y : block.y1});
+        if (high) add({block.x0, y, wide ? x : block.x1, block.y1});
+        if (wide && high) add({x, y, block.x1, block.y1});
         return parts;
     }
 
@@ -284,6 +331,8 @@ private:
     const ReceiverImage& receivers_;
     std::size_t channels_;
     float tolerance_;
+    bool proves_lit_;
+    double made_;
     const OccluderField& field_;
     const ShadePixels& shade_;
     double pixel_ = 0;            // a pixel's footprint over depth; orthographic: itself
@@ -294,9 +343,9 @@ private:
 
 } // namespace
 
-CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade)
+CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, const Coarse& coarse, const OccluderField& field, const ShadePixels& shade)
 {
-    return Shading(receivers, channels, tolerance, field, shade).run();
+    return Shading(receivers, channels, coarse, field, shade).run();
 }
 
 } // namespace penumbra

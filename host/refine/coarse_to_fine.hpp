@@ -1,11 +1,11 @@
 // A mask computed only where it must be: some receivers of every block are shaded, and the block is divided where they do not tell the others.
 //
-// Visibility is smooth inside a penumbra. Blocks of 16 x 16 pixels are shaded at their corners, the middles of their edges and their centre. A block is
+// Visibility is smooth inside a penumbra. Blocks of 32 x 32 pixels are shaded at their corners, the middles of their edges and their centre. A block is
 // divided, down to single pixels, where
 //  - its receivers are not of one smooth surface,
 //  - a silhouette may pass unseen between the shaded ones (occluder_field.hpp),
 //  - one of the five middles differs by more than `tolerance` from what the corners say.
-// Elsewhere pixels lie between the nine.
+// Elsewhere pixels lie between the nine. A block that nothing can darken, neither what casts nor its own horizon, is not shaded at all.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,12 @@ struct CoarseToFine {
     std::uint64_t receivers = 0, shaded = 0;
 };
 
-// tolerance: above 0. The same bits whatever the threads, as long as `shade` gives them.
-CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, double tolerance, const OccluderField& field, const ShadePixels& shade);
+struct Coarse {
+    double tolerance = 0;   // above 0
+    bool proves_lit = false; // the field's maps and the receivers' own horizons are all that darkens
+};
+
+// The same bits whatever the threads, as long as `shade` gives them.
+CoarseToFine shade_coarse_to_fine(const ReceiverImage& receivers, int channels, const Coarse& coarse, const OccluderField& field, const ShadePixels& shade);
 
 } // namespace penumbra

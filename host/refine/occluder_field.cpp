@@ -21,6 +21,7 @@ struct OccluderField::Query {
     double reach_x, reach_y; // how far a penumbra goes in xi and eta for each height above the receiver
     double rise;             // that heights above the receiver's must have
     int left = most_cells;
+    bool casts = false;      // something may
     double plane(double xi, double eta) const { return level + slope_xi * xi + slope_eta * eta; }
 };
 
@@ -71,7 +72,7 @@ LightPoint OccluderField::point(const Vec3& world) const
     return {x, y, z, x / (spread * view_.half_extent.x), y / (spread * view_.half_extent.y)};
 }
 
-bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
+Passing OccluderField::passing(const ReceiverPatch& patch, double share) const
 {
     const auto& c = patch.corners;
     Query query{};
@@ -79,7 +80,7 @@ bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
     query.xi_high = query.eta_high = query.high = -query.xi_low;
     double z_low = query.xi_low, up[4];
     for (int i = 0; i < 4; ++i) {
-        if (!(c[i].z > 0)) return false;
+        if (!(c[i].z > 0)) return Passing::much;
         up[i] = height_of(c[i].z);
         query.xi_low = std::min(query.xi_low, c[i].xi);
         query.xi_high = std::max(query.xi_high, c[i].xi);
@@ -92,7 +93,7 @@ bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
 
     const double ax = c[1].xi - c[0].xi, ay = c[1].eta - c[0].eta, bx = c[2].xi - c[0].xi, by = c[2].eta - c[0].eta;
     const double area = ax * by - ay * bx;
-    if (!(std::abs(area) > 1e-6 * (ax * ax + ay * ay + bx * bx + by * by))) return false; // edge-on to the light
+    if (!(std::abs(area) > 1e-6 * (ax * ax + ay * ay + bx * bx + by * by))) return Passing::much; // edge-on to the light
     query.slope_xi = ((up[1] - up[0]) * by - (up[2] - up[0]) * ay) / area;
     query.slope_eta = ((up[2] - up[0]) * ax - (up[1] - up[0]) * bx) / area;
     query.level = up[0] - query.slope_xi * c[0].xi - query.slope_eta * c[0].eta;
@@ -112,7 +113,27 @@ bool OccluderField::resolves(const ReceiverPatch& patch, double share) const
     query.rise = std::max(moved_x / light_.half_u, moved_y / light_.half_v) * per / (2 * share);
     query.reach_x = light_.half_u / view_.half_extent.x;
     query.reach_y = light_.half_v / view_.half_extent.y;
-    return cell_resolved(query, levels_.size() - 1, 0, 0);
+    if (!cell_resolved(query, levels_.size() - 1, 0, 0)) return Passing::much;
+    return query.casts || !shows_all(query) ? Passing::little : Passing::nothing;
+}
+
+// Whether the light's whole window, from any of the patch's receivers on what is nearest to the light, lies on the maps.
+bool OccluderField::shows_all(const Query& query) const
+{
+    const double rise = levels_.back().high.front() - query.low;
+    if (!(rise > 0)) return true;
+    const double reach_x = rise * query.reach_x, reach_y = rise * query.reach_y;
+    return query.xi_low - reach_x >= -1 && query.xi_high + reach_x <= 1 && query.eta_low - reach_y >= -1 && query.eta_high + reach_y <= 1;
+}
+
+bool OccluderField::all_above(const Vec3& world, const Vec3& normal, double turned) const
+{
+    if (view_.orthographic) return false; // not asked yet
+    const Vec3 to = light_.origin - world;
+    // Of a sphere what reaches towards the receivers as well.
+    const double reach = light_.half_u * std::abs(normal.dot(light_.u)) + light_.half_v * std::abs(normal.dot(light_.v)) +
+                         std::max(light_.half_u, light_.half_v) * std::abs(normal.dot(light_.direction));
+    return normal.dot(to) > reach + turned * (to.length() + light_.half_u + light_.half_v);
 }
 
 bool OccluderField::cell_resolved(Query& query, std::size_t level, int x, int y) const
@@ -127,14 +148,21 @@ bool OccluderField::cell_resolved(Query& query, std::size_t level, int x, int y)
     const double side_x = 2.0 / levels_.front().width, side_y = 2.0 / levels_.front().height, cell = std::ldexp(1.0, static_cast<int>(level));
     const double left = x * cell * side_x - 1, right = left + cell * side_x, top = 1 - y * cell * side_y, bottom = top - cell * side_y;
     const double reach_x = (high - query.low) * query.reach_x, reach_y = (high - query.low) * query.reach_y;
-    if (left - reach_x > query.xi_high || right + reach_x < query.xi_low || bottom - reach_y > query.eta_high || top + reach_y < query.eta_low) return true;
+    const auto beside = [&](double x_spare, double y_spare) {
+        return left - reach_x - x_spare > query.xi_high || right + reach_x + x_spare < query.xi_low || bottom - reach_y - y_spare > query.eta_high || top + reach_y + y_spare < query.eta_low;
+    };
+    if (beside(side_x, side_y)) return true;
 
     const double middle = query.plane(0.5 * (left + right), 0.5 * (top + bottom));
     const double half = 0.5 * (std::abs(query.slope_xi) * (right - left) + std::abs(query.slope_eta) * (top - bottom));
     const double plane_high = middle + half + query.margin, plane_low = middle - half - query.margin;
     if (high <= (level == 0 ? plane_high : plane_low)) return true; // the patch's own surface, or below it
-    if (low > plane_high && low >= query.high + query.rise) return true;
-    if (level == 0) return false;
+    if (level == 0) query.casts = true;
+    if (low > plane_high && low >= query.high + query.rise) {
+        query.casts = true;
+        return true;
+    }
+    if (level == 0) return beside(0, 0);
     const Level& below = levels_[level - 1];
     for (int j = 2 * y; j < std::min(2 * y + 2, below.height); ++j)
         for (int i = 2 * x; i < std::min(2 * x + 2, below.width); ++i)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -24,14 +25,25 @@ struct ReceiverPatch {
     double step_x = 0, step_y = 0, step_z = 0; // from one shaded receiver to the next along light space's axes, at the most, scene units
 };
 
+// What passes between a patch's shaded receivers.
+enum class Passing : std::uint8_t {
+    nothing, // casts on the patch at all
+    little,  // what casts moves little from one shaded receiver to the next
+    much,
+};
+
 class OccluderField {
 public:
     // maps: planar depth in `view`, the light's own, all of one size. A texel is full from its least depth to its greatest.
     OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps);
 
-    // Whether the penumbra of everything that casts on the patch is at least 1 / `share` steps wide: from one shaded receiver to the next the
+    // `little`: the penumbra of everything that casts on the patch is at least 1 / `share` steps wide: from one shaded receiver to the next the
     // back-projection of what casts moves by at most that share of the light, so that nothing passes unseen between the two.
-    bool resolves(const ReceiverPatch& patch, double share) const;
+    // `nothing`: nothing that the maps show stands between the patch and any part of the light, with a cell to spare, and the maps show all that might.
+    Passing passing(const ReceiverPatch& patch, double share) const;
+
+    // Whether all of the light lies above the plane of a surface there, and above those whose normals, of unit length, turn from this one by up to `turned`.
+    bool all_above(const Vec3& world, const Vec3& normal, double turned) const;
 
     LightPoint point(const Vec3& world) const;
 
@@ -44,6 +56,7 @@ private:
     struct Query;
     double height_of(double z) const { return view_.orthographic ? -z : 1 / z; }
     bool cell_resolved(Query& query, std::size_t level, int x, int y) const;
+    bool shows_all(const Query& query) const;
     void add_level();
 
     LightFrame light_;

@@ -85,4 +85,23 @@ ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, con
     return points;
 }
 
+ReceiverPoints listed_receiver_points(opencl::Work& work, const ReceiverView& view, const PixelList& list, const ImageOnDevice& image, double precision,
+                                      const opencl::Specialisation& program)
+{
+    ReceiverView of_list = view;
+    of_list.width = of_list.stride = TILE_WIDTH;
+    of_list.height = of_list.rows = list.rows();
+    ReceiverPoints points = room_for_points(work, of_list, precision);
+    points.is_list = true;
+    points.has_planes = image.normals != nullptr;
+    if (points.has_planes) {
+        points.slope_xi = work.buffer<float>(points.d.count(), "receivers' slopes in xi");
+        points.slope_eta = work.buffer<float>(points.d.count(), "receivers' slopes in eta");
+    }
+    work.launch(program, "receivers_of_pixels", {list.length(), 1}, {64, 1}, list.count() * 40, view, static_cast<cl_int>(list.count()), static_cast<cl_int>(list.length()), list.pixels,
+                image.points ? cl::Buffer() : image.depth, image.points ? image.points->memory() : cl::Buffer(), image.normals ? image.normals->memory() : cl::Buffer(), points.xi, points.eta,
+                points.d, points.slope_xi, points.slope_eta);
+    return points;
+}
+
 } // namespace penumbra

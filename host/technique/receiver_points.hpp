@@ -38,6 +38,26 @@ ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, con
 ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& points, double precision,
                                       const opencl::Specialisation& program = receivers_program());
 
+// Some pixels of an image on the device, as a list of its own: TILE_WIDTH a row, rows of whole tiles, what is left of the last ones empty.
+struct PixelList {
+    const opencl::Buffer<cl_uint>& pixels; // y width + x
+    int width, height;                     // of the whole image
+
+    std::size_t count() const { return pixels.count(); }
+    int rows() const { return static_cast<int>((count() + TILE_WIDTH * tile_rows - 1) / (TILE_WIDTH * tile_rows)) * tile_rows; }
+    std::size_t length() const { return static_cast<std::size_t>(rows()) * TILE_WIDTH; }
+};
+
+// What an image of receivers has on the device: depth or, where there are some, points; normals, null where planes are not known.
+struct ImageOnDevice {
+    cl::Buffer depth;
+    const opencl::Buffer<DepthVector>*points = nullptr, *normals = nullptr;
+};
+
+// The points, with their planes, of the pixels of an image. `view`: of the whole image.
+ReceiverPoints listed_receiver_points(opencl::Work& work, const ReceiverView& view, const PixelList& list, const ImageOnDevice& image, double precision,
+                                      const opencl::Specialisation& program);
+
 // Gives the points their planes. `normals`: of their surfaces, towards the camera, in its coordinates, [view.height][view.width].
 void add_planes(opencl::Work& work, ReceiverPoints& points, const opencl::Buffer<DepthVector>& normals, const opencl::Specialisation& program = receivers_program());
 

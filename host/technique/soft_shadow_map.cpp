@@ -223,11 +223,15 @@ void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prep
         shade_side(work, prepared, prepared.sides[i], i > 0, receivers, bounds, visibility, evaluated);
 
     if (!counts) return;
-    for (const cl_float8& box : work.read(bounds)) {
-        counts->receivers += static_cast<std::uint64_t>(box.s[6]);
-        counts->uncovered_receivers += static_cast<std::uint64_t>(box.s[7]);
-    }
-    for (const cl_uint texels : work.read(evaluated)) counts->pairs += std::uint64_t{texels} * TILE_WIDTH * (united ? 1 : tile_rows);
+    work.read_later(bounds, [counts](const std::vector<cl_float8>& boxes) {
+        for (const cl_float8& box : boxes) {
+            counts->receivers += static_cast<std::uint64_t>(box.s[6]);
+            counts->uncovered_receivers += static_cast<std::uint64_t>(box.s[7]);
+        }
+    });
+    work.read_later(evaluated, [counts, united](const std::vector<cl_uint>& all) {
+        for (const cl_uint texels : all) counts->pairs += std::uint64_t{texels} * TILE_WIDTH * (united ? 1 : tile_rows);
+    });
 }
 
 void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::Buffer& mask, int mask_width, int mask_height,
@@ -244,7 +248,8 @@ Needs needs(const SoftShadowMap& settings)
     return {.front = settings.sides != Sides::back,
             .back = settings.sides != Sides::front,
             .layers = settings.visibility == PatchVisibility::united && settings.sides != Sides::back ? settings.layers : 0,
-            .receivers_from_light = settings.project};
+            .receivers_from_light = settings.project,
+            .maps_tell_all = true};
 }
 
 PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings)

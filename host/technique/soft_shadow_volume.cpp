@@ -440,8 +440,12 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
                     static_cast<cl_int>(prepared.settings.table), work.stop());
     }
     if (!counts) return;
-    for (const cl_float8& box : work.read(bounds)) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
-    for (const cl_uint2& tile : work.read(evaluated)) counts->pairs += std::uint64_t{tile.s[0]} * TILE_WIDTH * tile_rows;
+    work.read_later(bounds, [counts](const std::vector<cl_float8>& boxes) {
+        for (const cl_float8& box : boxes) counts->receivers += static_cast<std::uint64_t>(box.s[6]);
+    });
+    work.read_later(evaluated, [counts](const std::vector<cl_uint2>& tiles) {
+        for (const cl_uint2& tile : tiles) counts->pairs += std::uint64_t{tile.s[0]} * TILE_WIDTH * tile_rows;
+    });
 }
 
 void check_together(const SoftShadowVolume& settings)

@@ -58,6 +58,8 @@ struct Needs {
     bool whole_view = false;
     // Receiving::from_light: what the light sees of the receivers. Their mask is then shaded whole.
     bool receivers_from_light = false;
+    // What its maps show between a receiver and the light, and the receiver's own horizon, are all that darkens it.
+    bool maps_tell_all = false;
     // What computing fewer receivers may add to a pixel's error; 0: each is shaded.
     double tolerance = 0;
 };
@@ -111,7 +113,10 @@ struct Receiving {
     cl::Buffer device_depth;                                 // for techniques of the device, unless there are points
     const opencl::Buffer<DepthVector>* device_points = nullptr; // what is shaded where pixels' centres are not: lifted, or some pixels
     const DepthSurface* surface = nullptr; // what was fitted to `depth`, where it is somebody else's: lifted points and their normals
-    const ChosenReceivers* chosen = nullptr; // where these are some pixels of an image: `depth` and `surface` are theirs, as a list
+    // Where these are some pixels of an image. On the host, for techniques that work there: `depth` and `surface` are theirs, as a list. On the device:
+    // device_depth, device_points, normals and depth are the whole image's, width and height the list's.
+    const ChosenReceivers* chosen = nullptr;
+    const PixelList* listed = nullptr;
     // Of each pixel's surface, towards the camera and in its coordinates; null: not known.
     const opencl::Buffer<DepthVector>* normals = nullptr;
     const Camera& view;      // Findings::view

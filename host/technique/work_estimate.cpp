@@ -23,7 +23,7 @@ ChosenTiles chosen_tiles(opencl::Work& work, const ReceiverPoints& points, const
     const std::vector<cl_int> numbers = spread_numbers(columns, rows, count);
     const auto tiles = work.upload(std::span<const cl_int>(numbers), "tiles of a sample");
 
-    ChosenTiles chosen{.points = {.view = points.view, .precision = points.precision, .xi = {}, .eta = {}, .d = {}, .slope_xi = {}, .slope_eta = {}, .has_planes = points.has_planes},
+    ChosenTiles chosen{.points = {.view = points.view, .precision = points.precision, .xi = {}, .eta = {}, .d = {}, .slope_xi = {}, .slope_eta = {}, .has_planes = points.has_planes, .is_list = points.is_list},
                        .times = static_cast<double>(tile_count(points.view)) / count};
     ReceiverPoints& some = chosen.points;
     some.view.width = some.view.stride = TILE_WIDTH;

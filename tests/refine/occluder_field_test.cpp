@@ -51,8 +51,8 @@ TEST(OccluderField, ResolvesStepsUpToTheirShareOfThePenumbra)
 {
     const OccluderField field = Field(2).field();
     for (const double share : {0.1, 0.25, 0.5}) {
-        EXPECT_TRUE(field.resolves(patch(field, 0, 0, 4, 0.01, 0.999 * 2 * share), share)) << share;
-        EXPECT_FALSE(field.resolves(patch(field, 0, 0, 4, 0.01, 1.001 * 2 * share), share)) << share;
+        EXPECT_NE(field.passing(patch(field, 0, 0, 4, 0.01, 0.999 * 2 * share), share), Passing::much) << share;
+        EXPECT_EQ(field.passing(patch(field, 0, 0, 4, 0.01, 1.001 * 2 * share), share), Passing::much) << share;
     }
 }
 
@@ -61,17 +61,17 @@ TEST(OccluderField, WhatCannotCastOnThePatchDoesNotCount)
 {
     const OccluderField field = Field(2).field();
     const double rim = 2 * 0.25 * 2; // half the plate's width at depth 4, from the light's centre
-    EXPECT_FALSE(field.resolves(patch(field, rim + 0.95, 0, 4, 0.01, 1.9), 0.25));
-    EXPECT_TRUE(field.resolves(patch(field, rim + 1.2, 0, 4, 0.01, 1.9), 0.25));
+    EXPECT_EQ(field.passing(patch(field, rim + 0.95, 0, 4, 0.01, 1.9), 0.25), Passing::much);
+    EXPECT_NE(field.passing(patch(field, rim + 1.2, 0, 4, 0.01, 1.9), 0.25), Passing::much);
 }
 
 // Receivers on the plate itself: its own surface is no caster; what lies just above them is, and no step resolves that.
 TEST(OccluderField, ThePatchsOwnSurfaceIsNoCaster)
 {
     const OccluderField own = Field(2).field();
-    EXPECT_TRUE(own.resolves(patch(own, 0, 0, 2, 0.05, 0.5), 0.25));
+    EXPECT_NE(own.passing(patch(own, 0, 0, 2, 0.05, 0.5), 0.25), Passing::much);
     const OccluderField above = Field(1.99f).field();
-    EXPECT_FALSE(above.resolves(patch(above, 0, 0, 2, 0.05, 0.5), 0.25));
+    EXPECT_EQ(above.passing(patch(above, 0, 0, 2, 0.05, 0.5), 0.25), Passing::much);
 }
 
 TEST(OccluderField, ALightWithoutExtentIsResolvedWhereNothingCasts)
@@ -79,8 +79,8 @@ TEST(OccluderField, ALightWithoutExtentIsResolvedWhereNothingCasts)
     Field point(2);
     point.light.half_u = point.light.half_v = 0;
     const OccluderField field = point.field();
-    EXPECT_FALSE(field.resolves(patch(field, 0, 0, 4, 0.1, 0.001), 0.25));
-    EXPECT_TRUE(field.resolves(patch(field, 3, 3, 4, 0.1, 0.001), 0.25));
+    EXPECT_EQ(field.passing(patch(field, 0, 0, 4, 0.1, 0.001), 0.25), Passing::much);
+    EXPECT_NE(field.passing(patch(field, 3, 3, 4, 0.1, 0.001), 0.25), Passing::much);
 }
 
 } // namespace
