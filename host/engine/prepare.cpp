@@ -200,7 +200,10 @@ void add_field(Prepared::State& state, const Casting& casting, const Geometry& g
     for (const DepthMap& layer : casting.depth.layers) maps.push_back(&layer);
     const LightFrame frame = light_frame(state.light);
     if (!maps.empty()) {
+        const Stopwatch watch;
         state.field = std::make_shared<const OccluderField>(frame, casting.depth.camera, maps);
+        add_stages(state.stages, {{"prepare", watch.ms(), 0, 0}});
+        state.prepare_ms = work_ms(state.stages);
         return;
     }
     if (!geometry.state().any(&Object::casts)) return;

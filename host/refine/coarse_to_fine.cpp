@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <cstdio>
-#include <cstdlib>
 #include <cmath>
 #include <limits>
 
@@ -14,12 +11,13 @@
 
 namespace penumbra {
 namespace {
-static double tick(){return std::chrono::duration<double,std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();}
 
 constexpr int coarsest = 32;         // pixels along a block's side
 constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
 constexpr float turned = 0.15f;      // how far its normals may turn, in radians
-constexpr double most_passed = 0.1; // of the light, from one shaded receiver to the next
+// Of the light, that what casts may pass from one shaded receiver to the next: so many tolerances, within bounds. Thin things are seen as long as their
+// penumbrae are four steps wide; kinks lie nearer to a shaded receiver the smaller the steps are.
+constexpr double passed_per_tolerance = 20, least_passed = 0.1, most_passed = 0.25;
 constexpr std::size_t many_blocks = 8, many_kept = 128; // that a thread takes at once
 constexpr std::size_t few_groups = 4; // threads take longer to start than these
 constexpr int rows_together = 64;
@@ -38,10 +36,10 @@ enum class BlockKind : std::uint8_t { lit, divided, asked }; // lit, or empty
 class Shading {
 public:
     Shading(const ReceiverImage& receivers, int channels, const Coarse& coarse, const OccluderField& field, const ShadePixels& shade)
-        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(coarse.tolerance)), proves_lit_(coarse.proves_lit && !receivers.normals.empty()),
+        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(coarse.tolerance)), passed_(std::clamp(passed_per_tolerance * coarse.tolerance, least_passed, most_passed)),
+          proves_lit_(coarse.proves_lit && !receivers.normals.empty()),
           field_(field), shade_(shade)
     {
-        made_=tick();
         const std::size_t count = static_cast<std::size_t>(receivers.width) * static_cast<std::size_t>(receivers.height);
         result_.visibility.assign(count * channels_, 1.f);
         known_.assign(count, 0);
@@ -55,13 +53,9 @@ public:
     CoarseToFine run()
     {
         std::vector<Block> blocks = roots(), kept;
-        double ta=0,tk=0,tt=0,t0=tick(),t00=t0;int rounds=0;
         while (!blocks.empty()) {
-            ++rounds;double t1=tick();tt+=t1-t0;
             const std::vector<Block> asked = asked_of(blocks);
-            double t2=tick();ta+=t2-t1;
             ask(asked);
-            t0=tick();tk+=t0-t2;
             blocks.clear();
             for (const Block& block : asked) {
                 if (block.whole()) continue;
@@ -73,13 +67,10 @@ public:
                 }
             }
         }
-        double t3=tick();tt+=t3-t0;
         parallel_for(static_cast<int>((kept.size() + many_kept - 1) / many_kept), [&](int group) {
             const std::size_t begin = static_cast<std::size_t>(group) * many_kept;
             for (std::size_t i = begin; i < std::min(kept.size(), begin + many_kept); ++i) interpolate(kept[i]);
         });
-        double t4=tick();
-        if(getenv("TICK"))fprintf(stderr,"init %.2f kinds %.2f ask %.2f told %.2f fill %.2f rounds %d\n",t00-made_,ta,tk,tt,t4-t3,rounds);
         std::uint64_t count = 0;
         for (const float nearness : nearness_) count += nearness != 0;
         result_.receivers = count;
@@ -143,7 +134,7 @@ private:
         if (empty(block)) return BlockKind::lit;
         if (!smooth(block)) return block.whole() ? BlockKind::asked : BlockKind::divided;
         const Corners corners = corners_of(block);
-        const Passing passing = field_.passing(patch_of(block, corners), most_passed);
+        const Passing passing = field_.passing(patch_of(block, corners), passed_);
         if (passing == Passing::nothing && proves_lit_ && faces_light(block, corners)) return BlockKind::lit;
         return passing != Passing::much || block.whole() ? BlockKind::asked : BlockKind::divided;
     }
@@ -331,8 +322,8 @@ private:
     const ReceiverImage& receivers_;
     std::size_t channels_;
     float tolerance_;
+    double passed_;
     bool proves_lit_;
-    double made_;
     const OccluderField& field_;
     const ShadePixels& shade_;
     double pixel_ = 0;            // a pixel's footprint over depth; orthographic: itself

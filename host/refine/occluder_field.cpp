@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "scene/parallel.hpp"
+
 namespace penumbra {
 namespace {
 
@@ -32,20 +34,41 @@ OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::s
     Level level{.width = (width + joined - 1) / joined, .height = (height + joined - 1) / joined, .low = {}, .high = {}};
     level.low.assign(static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height), nothing_low);
     level.high.assign(level.low.size(), nothing_high);
-    for (const DepthMap* map : maps) {
-        precision_ = std::max(precision_, map->precision);
-        for (int y = 0; y < height; ++y)
-            for (int x = 0; x < width; ++x) {
-                const float z = map->at(x, y);
-                if (!(z > 0) || !std::isfinite(z)) continue;
-                const float up = static_cast<float>(height_of(z));
-                const std::size_t cell = static_cast<std::size_t>(y / joined) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x / joined);
-                level.low[cell] = std::min(level.low[cell], up);
-                level.high[cell] = std::max(level.high[cell], up);
-            }
-    }
+    for (const DepthMap* map : maps) precision_ = std::max(precision_, map->precision);
+    constexpr int rows_together = 32;
+    parallel_for((level.height + rows_together - 1) / rows_together, [&](int group) {
+        std::vector<float> near(static_cast<std::size_t>(width)), far(near.size());
+        for (int row = group * rows_together; row < std::min(level.height, (group + 1) * rows_together); ++row) add_row(maps, row, joined, near, far, level);
+    });
     levels_.push_back(std::move(level));
     while (levels_.back().width > 1 || levels_.back().height > 1) add_level();
+}
+
+// A row of cells: first down the columns of every map, then across.
+void OccluderField::add_row(std::span<const DepthMap* const> maps, int row, int joined, std::vector<float>& near, std::vector<float>& far, Level& level) const
+{
+    constexpr float most = std::numeric_limits<float>::max();
+    const int width = maps.front()->width, height = maps.front()->height;
+    std::fill(near.begin(), near.end(), most);
+    std::fill(far.begin(), far.end(), 0.f);
+    for (const DepthMap* map : maps)
+        for (int y = row * joined; y < std::min(height, (row + 1) * joined); ++y) {
+            const float* z = map->depth.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+            for (std::size_t x = 0; x < near.size(); ++x) {
+                const bool there = z[x] > 0 && z[x] <= most;
+                const float low = there ? z[x] : most, high = there ? z[x] : 0.f;
+                near[x] = low < near[x] ? low : near[x];
+                far[x] = high > far[x] ? high : far[x];
+            }
+        }
+    const std::size_t begin = static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width);
+    for (int cell = 0; cell < level.width; ++cell) {
+        const auto first = static_cast<std::ptrdiff_t>(cell) * joined, last = std::min<std::ptrdiff_t>(first + joined, width);
+        const float least = *std::min_element(near.begin() + first, near.begin() + last), greatest = *std::max_element(far.begin() + first, far.begin() + last);
+        if (greatest == 0) continue;
+        level.low[begin + static_cast<std::size_t>(cell)] = static_cast<float>(height_of(greatest));
+        level.high[begin + static_cast<std::size_t>(cell)] = static_cast<float>(height_of(least));
+    }
 }
 
 void OccluderField::add_level()

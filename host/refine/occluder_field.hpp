@@ -57,6 +57,7 @@ private:
     double height_of(double z) const { return view_.orthographic ? -z : 1 / z; }
     bool cell_resolved(Query& query, std::size_t level, int x, int y) const;
     bool shows_all(const Query& query) const;
+    void add_row(std::span<const DepthMap* const> maps, int row, int joined, std::vector<float>& near, std::vector<float>& far, Level& level) const;
     void add_level();
 
     LightFrame light_;
