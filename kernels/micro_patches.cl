@@ -115,13 +115,26 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
     const int2 first = (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y));
     const int2 last = (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y));
     float nearest = 0.0f, furthest = MAXFLOAT, all = 0.0f;
-    for (int j = first.y; j < last.y; ++j)
-        for (int i = first.x; i < last.x; ++i) {
+    float8 near = (float8)(0.0f), far = (float8)(MAXFLOAT), sums = (float8)(0.0f);
+    for (int j = first.y; j < last.y; ++j) {
+        int i = first.x;
+        for (; i + 8 <= last.x; i += 8) {
+            const float8 z = vload8(0, depth + j * from.x + i), d = disparities_of(z);
+            near = select(near, d, d > near);
+            far = select(far, d, d < far);
+            sums += d;
+        }
+        for (; i < last.x; ++i) {
             const float d = disparity_of(depth[j * from.x + i]);
             nearest = d > nearest ? d : nearest;
             furthest = d < furthest ? d : furthest;
             all += d;
         }
+    }
+    const float4 near_half = fmax(near.lo, near.hi), far_half = fmin(far.lo, far.hi), sum_half = sums.lo + sums.hi;
+    nearest = fmax(nearest, fmax(fmax(near_half.x, near_half.y), fmax(near_half.z, near_half.w)));
+    furthest = fmin(furthest, fmin(fmin(far_half.x, far_half.y), fmin(far_half.z, far_half.w)));
+    all += (sum_half.x + sum_half.y) + (sum_half.z + sum_half.w);
     const int at = begin + y * size.x + x;
     const bool plain = furthest > 0.0f && nearest - furthest <= gap;
     if (plain || nearest == 0.0f) {

@@ -9,7 +9,7 @@
 namespace penumbra {
 namespace {
 
-constexpr int finest = 256;       // cells a side: larger maps are joined
+constexpr int finest = 128;       // cells a side: larger maps are joined
 constexpr int most_cells = 2048;  // that a patch asks about: one that has to ask more counts as not resolved
 constexpr float nothing_low = std::numeric_limits<float>::max(), nothing_high = -nothing_low;
 

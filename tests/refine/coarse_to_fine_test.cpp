@@ -1,4 +1,5 @@
 // Which receivers are shaded, and what lies between them.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -32,7 +33,7 @@ struct World {
     template <class Value> CoarseToFine shade(double tolerance, const Value& value) const
     {
         std::set<std::uint32_t> asked;
-        return shade_coarse_to_fine(image(), 1, tolerance, field(), [&](std::span<const std::uint32_t> pixels) {
+        return shade_coarse_to_fine(image(), 1, {.tolerance = tolerance}, field(), [&](std::span<const std::uint32_t> pixels) {
             std::vector<float> values;
             for (const std::uint32_t pixel : pixels) {
                 EXPECT_TRUE(asked.insert(pixel).second) << pixel << " twice";
@@ -48,7 +49,7 @@ TEST(CoarseToFine, ShadesFewOfAPlaneThatNothingCastsOn)
     const World world(257, 129);
     const CoarseToFine result = world.shade(0.01, [](int, int) { return 1.f; });
     EXPECT_EQ(result.receivers, 257u * 129);
-    EXPECT_EQ(result.shaded, 33u * 17); // every eighth, each way
+    EXPECT_EQ(result.shaded, 17u * 9); // every sixteenth, each way
     for (const float v : result.visibility) ASSERT_EQ(v, 1);
 }
 
@@ -114,7 +115,7 @@ TEST(CoarseToFine, NothingIsTakenAcrossATurnedNormal)
     ReceiverImage image = world.image();
     image.normals = normals;
     const OccluderField field = world.field();
-    const CoarseToFine result = shade_coarse_to_fine(image, 1, 0.01, field, [](std::span<const std::uint32_t> pixels) {
+    const CoarseToFine result = shade_coarse_to_fine(image, 1, {.tolerance = 0.01}, field, [](std::span<const std::uint32_t> pixels) {
         std::vector<float> values;
         for (const std::uint32_t pixel : pixels) values.push_back(pixel % 64 < 37 ? 0.f : 1.f);
         return values;
@@ -123,7 +124,7 @@ TEST(CoarseToFine, NothingIsTakenAcrossATurnedNormal)
         for (int x = 0; x < 64; ++x) ASSERT_EQ(result.visibility[static_cast<std::size_t>(y * 64 + x)], x < 37 ? 0.f : 1.f);
 }
 
-// A bar close above the receivers, thinner than the steps between those that are shaded first: nobody who looks at every eighth sees it.
+// A bar close above the receivers, thinner than the steps between those that are shaded first: nobody who looks at every sixteenth sees it.
 TEST(CoarseToFine, ABarBetweenTheShadedReceiversIsSeen)
 {
     World world(512, 512);
@@ -136,6 +137,81 @@ TEST(CoarseToFine, ABarBetweenTheShadedReceiversIsSeen)
     const CoarseToFine result = world.shade(0.01, value);
     for (int y = 0; y < 512; ++y)
         for (int x = 0; x < 512; ++x) ASSERT_EQ(result.visibility[static_cast<std::size_t>(y * 512 + x)], value(x, y)) << x;
+}
+
+// A plate of half the map's width in the middle, half-way to the light; receivers that face it.
+struct Lit : World {
+    std::vector<DepthVector> normals;
+    Lit() : World(256, 256), normals(256 * 256, DepthVector{0, 0, -1})
+    {
+        for (int y = 12; y < 20; ++y)
+            for (int x = 12; x < 20; ++x) map.at(x, y) = 4;
+    }
+    CoarseToFine shade_lit(const std::vector<float>& values) const
+    {
+        ReceiverImage all = image();
+        all.normals = normals;
+        return shade_coarse_to_fine(all, 1, {.tolerance = 0.01, .proves_lit = true}, field(), [&](std::span<const std::uint32_t> pixels) {
+            std::vector<float> some;
+            for (const std::uint32_t pixel : pixels) some.push_back(values[pixel]);
+            return some;
+        });
+    }
+};
+
+// The light's window of 1 x 1 at half-way: half of it wide, so a receiver at x sees the plate between -1 and 1 from x / 2 - 0.25 to x / 2 + 0.25.
+TEST(CoarseToFine, WhatNothingCanDarkenIsNotShaded)
+{
+    const Lit world;
+    std::vector<float> values(256 * 256, 1.f);
+    std::size_t dark = 0;
+    for (int y = 0; y < 256; ++y)
+        for (int x = 0; x < 256; ++x) {
+            const auto seen = [](int i) {
+                const double at = 2.0 * ((2 * i + 1) / 256.0 - 1); // half-way, where the map is 4 wide
+                return std::clamp(std::min(at + 0.25, 0.5) - std::max(at - 0.25, -0.5), 0.0, 0.5) / 0.5;
+            };
+            values[static_cast<std::size_t>(y * 256 + x)] = static_cast<float>(1 - seen(x) * seen(y));
+            dark += seen(x) * seen(y) > 0;
+        }
+    const CoarseToFine result = world.shade_lit(values);
+    for (std::size_t i = 0; i < values.size(); ++i) ASSERT_NEAR(result.visibility[i], values[i], 0.03) << i % 256 << ' ' << i / 256;
+    EXPECT_GT(result.shaded, 0u);
+    EXPECT_LT(result.shaded, dark / 2);
+    // The same where nothing casts at all: but for what sees past the map's border.
+    Lit none;
+    none.map.depth.assign(none.map.depth.size(), INFINITY);
+    EXPECT_EQ(none.shade_lit(values).shaded, 0u);
+}
+
+TEST(CoarseToFine, WhatTurnsFromTheLightIsShaded)
+{
+    const std::vector<float> values(256 * 256, 0.5f);
+    Lit world;
+    world.map.depth.assign(world.map.depth.size(), INFINITY);
+    const CoarseToFine flat = world.shade_lit(values);
+    EXPECT_EQ(flat.shaded, 0u);
+    world.normals.assign(world.normals.size(), DepthVector{0, 0, 1});
+    EXPECT_EQ(world.shade_lit(values).visibility, values);
+    // A quarter turn: of the light, from -0.5 to 0.5, all lies above the planes of those left of it, none above those right of it.
+    world.normals.assign(world.normals.size(), DepthVector{1, 0, 0});
+    const CoarseToFine turned = world.shade_lit(values);
+    EXPECT_EQ(turned.visibility[256 * 128], 1.f);
+    for (int x = 128 - 16; x < 256; ++x) EXPECT_EQ(turned.visibility[static_cast<std::size_t>(256 * 128 + x)], 0.5f) << x; // from x = -0.5 on
+    world.normals.assign(world.normals.size(), DepthVector{0, 0, 0}); // not known
+    EXPECT_EQ(world.shade_lit(values).visibility, values);
+}
+
+// What the maps do not show may cast: it is told from receivers that see past the border.
+TEST(CoarseToFine, WhatSeesPastTheMapIsShaded)
+{
+    const std::vector<float> values(256 * 256, 0.5f);
+    Lit world;
+    world.map.depth.assign(world.map.depth.size(), INFINITY);
+    world.map.at(16, 16) = 4;
+    const CoarseToFine result = world.shade_lit(values);
+    EXPECT_EQ(result.visibility.front(), 0.5f); // the corner's window reaches past the map
+    EXPECT_EQ(result.visibility[256 * 50 + 128], 1.f);
 }
 
 } // namespace

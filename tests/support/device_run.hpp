@@ -50,14 +50,15 @@ inline oracle::Map read_map(opencl::Work& work, const OccluderMap& map, int widt
     return result;
 }
 
-// One of a union's maps.
-inline oracle::Map read_map(opencl::Work& work, const PreparedUnion& united, int number, int width, int height)
+// One of a union's maps; their steps, which the union finds where it needs them, by the kernel that has a test of its own.
+inline oracle::Map read_map(opencl::Work& work, const PreparedUnion& united, int number, int width, int height, double precision)
 {
     const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height), first = static_cast<std::size_t>(number) * count;
-    oracle::Map result{.width = width, .height = height, .texels = {}};
-    const auto texels = work.read(united.texels, first, count), steps = work.read(united.steps, first, count);
-    for (std::size_t i = 0; i < count; ++i) result.texels.push_back({texels[i].s[0], texels[i].s[1], steps[i].s[0], steps[i].s[1]});
-    return result;
+    const std::vector<cl_float2> texels = work.read(united.texels, first, count);
+    const OccluderMap map{.texels = work.upload(std::span<const cl_float2>(texels), "texels"), .steps = work.buffer<cl_float2>(count, "steps")};
+    work.launch(occluders_program(), "slope_steps", {static_cast<std::size_t>(width), static_cast<std::size_t>(height)}, {16, 8}, 0, cl_int2{{width, height}}, static_cast<float>(precision),
+                map.texels, map.steps);
+    return read_map(work, map, width, height);
 }
 
 inline std::vector<oracle::Receiver> read_points(opencl::Work& work, const ReceiverPoints& points)
@@ -102,7 +103,7 @@ inline SoftRun run(const std::shared_ptr<opencl::Context>& context, const SoftCa
     shade_soft_shadow_map(work, prepared, points, visibility.memory(), &result.counts);
 
     for (const auto& side : prepared.sides) result.maps.push_back(read_map(work, side.map, prepared.view.width, prepared.view.height));
-    for (int map = 0; map < prepared.united.maps; ++map) result.maps.push_back(read_map(work, prepared.united, map, prepared.view.width, prepared.view.height));
+    for (int map = 0; map < prepared.united.maps; ++map) result.maps.push_back(read_map(work, prepared.united, map, prepared.view.width, prepared.view.height, prepared.precision));
     result.points = read_points(work, points);
     result.visibility = work.read(visibility);
     result.settings = {.kx = prepared.view.light_scale_x,
