@@ -289,6 +289,8 @@ std::vector<float> shade_on_device(opencl::Work& work, const Prepared::State& st
     return std::move(grey.pixels);
 }
 
+constexpr std::size_t few_receivers = 4096;
+
 // Shades coarse to fine, within the technique's tolerance.
 Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade& whole, Shaded& shaded, Report& report)
 {
@@ -305,7 +307,13 @@ Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade
     ShadeCounts counted;
     const auto shade_list = [&](std::span<const std::uint32_t> pixels) {
         ShadeCounts counts;
-        Shaded some{.visibility = {}, .image = {}, .counts = shaded.counts ? &counts : nullptr, .estimated = shaded.estimated, .bound = nullptr};
+        Shaded some{.visibility = {}, .image = {}, .counts = shaded.counts ? &counts : nullptr, .estimated = {}, .bound = nullptr};
+        // With what earlier lists took. A few receivers more are not worth a sample.
+        if (shaded.estimated && (counted.pairs == 0 || pixels.size() > few_receivers))
+            some.estimated = [&](WorkAmount amount) {
+                amount.amount += static_cast<double>(counted.pairs);
+                shaded.estimated(amount);
+            };
         std::vector<float> values = from_host ? shade_on_host(work, state, whole, pixels, some) : shade_on_device(work, state, all, pixels, some);
         counted += counts;
         work.stage("choose receivers");

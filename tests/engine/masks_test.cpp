@@ -102,7 +102,7 @@ TEST(EngineReport, AddsUp)
     EXPECT_GT(report.prepare_ms, 0);
     EXPECT_GT(report.shade_ms, 0);
     EXPECT_GE(report.total_ms, work);
-    for (const char* name : {"upload occluders", "prepare", "upload receivers", "receivers", "shade", "read back"})
+    for (const char* name : {"upload occluders", "prepare", "upload receivers", "choose receivers", "shade"})
         EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
 
