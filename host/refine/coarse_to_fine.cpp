@@ -15,9 +15,12 @@ namespace {
 constexpr int coarsest = 32;         // pixels along a block's side
 constexpr double flat = 0.25;        // pixels that a block's surface may leave its corners' bilinear
 constexpr float turned = 0.15f;      // how far its normals may turn, in radians
-// Of the light, that what casts may pass from one shaded receiver to the next: so many tolerances, within bounds. Thin things are seen as long as their
-// penumbrae are four steps wide; kinks lie nearer to a shaded receiver the smaller the steps are.
-constexpr double passed_per_tolerance = 20, least_passed = 0.1, most_passed = 0.25;
+// What is allowed so that no pixel is off by more than the tolerance: of the tolerance, between a middle and what the corners say; of the light, for so much
+// tolerance, what casts may pass from one shaded receiver to the next. Visibility bends where a silhouette enters the light or leaves it, and where a corner
+// does, anywhere between two shaded receivers; what lies between them is then off by up to a fifth of what passes. Thin things are seen as long as their
+// penumbrae are four steps wide. Both shares are measured (docs/tolerance.md).
+constexpr float middle_per_tolerance = 1.f / 6;
+constexpr double passed_per_tolerance = 10. / 3, most_passed = 0.25;
 constexpr std::size_t many_blocks = 8, many_kept = 128; // that a thread takes at once
 constexpr std::size_t few_groups = 4; // threads take longer to start than these
 constexpr int rows_together = 64;
@@ -36,7 +39,7 @@ enum class BlockKind : std::uint8_t { lit, divided, asked }; // lit, or empty
 class Shading {
 public:
     Shading(const ReceiverImage& receivers, int channels, const Coarse& coarse, const OccluderField& field, const ShadePixels& shade)
-        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), tolerance_(static_cast<float>(coarse.tolerance)), passed_(std::clamp(passed_per_tolerance * coarse.tolerance, least_passed, most_passed)),
+        : receivers_(receivers), channels_(static_cast<std::size_t>(channels)), middle_off_(middle_per_tolerance * static_cast<float>(coarse.tolerance)), passed_(std::min(passed_per_tolerance * coarse.tolerance, most_passed)),
           proves_lit_(coarse.proves_lit && !receivers.normals.empty()),
           field_(field), shade_(shade)
     {
@@ -265,7 +268,7 @@ private:
             const float top = a + (b - a) * u, bottom = c + (d - c) * u, left = a + (c - a) * v, right = b + (d - b) * v;
             const float most = std::max({std::abs(value(x, block.y0, k) - top), std::abs(value(x, block.y1, k) - bottom), std::abs(value(block.x0, y, k) - left),
                                          std::abs(value(block.x1, y, k) - right), std::abs(value(x, y, k) - (top + (bottom - top) * v))});
-            if (!(most <= tolerance_)) return false;
+            if (!(most <= middle_off_)) return false;
         }
         return true;
     }
@@ -321,7 +324,7 @@ private:
 
     const ReceiverImage& receivers_;
     std::size_t channels_;
-    float tolerance_;
+    float middle_off_;
     double passed_;
     bool proves_lit_;
     const OccluderField& field_;

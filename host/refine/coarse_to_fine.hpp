@@ -4,7 +4,7 @@
 // divided, down to single pixels, where
 //  - its receivers are not of one smooth surface,
 //  - a silhouette may pass unseen between the shaded ones (occluder_field.hpp),
-//  - one of the five middles differs by more than `tolerance` from what the corners say.
+//  - one of the five middles differs by more than a sixth of `tolerance` from what the corners say.
 // Elsewhere pixels lie between the nine. A block that nothing can darken, neither what casts nor its own horizon, is not shaded at all.
 #pragma once
 

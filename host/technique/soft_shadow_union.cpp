@@ -9,8 +9,8 @@
 namespace penumbra {
 namespace {
 
-// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance.
-constexpr double coarse_per_tolerance = 6;
+// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance. Measured: errors of patches mostly cancel.
+constexpr double coarse_per_tolerance = 1;
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height); }

@@ -52,26 +52,31 @@ int scene_count()
     return text ? std::max(1, std::atoi(text)) : 24;
 }
 
-// On average it is kept. A single pixel may be off by more: between two shaded receivers an edge passes a tenth of the light at the most, and the corners of
-// what casts bend visibility there. Four times is measured (2.8 on 60 scenes), with half on top; it is not derived.
+// What the light's 32 x 32 samples are off by themselves, for a straight edge of the worst direction (kernels/common/light_pattern.clh): the whole mask has that,
+// and what lies between computed pixels has it not.
+constexpr double of_samples = 8.0 / 1024;
+
+// No pixel is off by more, and on average pixels are off by far less.
 TEST(Tolerance, IsKeptOnRandomScenes)
 {
     const Engine engine;
-    double worst = 0; // difference over tolerance
+    double worst = 0, worst_mean = 0; // difference over tolerance
     for (int seed = 1; seed <= scene_count(); ++seed) {
         const Scene scene = plates(static_cast<unsigned>(seed), 200);
-        for (const double tolerance : {0.02, 0.005}) {
-            const Mask whole = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, 0), some = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, tolerance);
+        const Mask whole = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, 0);
+        EXPECT_EQ(whole.report.receivers, 0u);
+        for (const double tolerance : {0.1, 0.03, 0.01}) {
+            const Mask some = mask_of(engine, scene, {.kind = "soft_shadow_map", .settings = {}}, tolerance);
             const Metrics off = compare(some.visibility, whole.visibility);
-            EXPECT_LE(off.mae_shadow, tolerance) << seed;
-            EXPECT_LE(off.max, 4 * tolerance) << seed;
-            worst = std::max(worst, off.max / tolerance);
+            EXPECT_LE(off.mae_shadow, 0.25 * tolerance) << seed;
+            EXPECT_LE(off.max, tolerance + of_samples) << seed;
+            worst = std::max(worst, off.max / (tolerance + of_samples));
+            worst_mean = std::max(worst_mean, off.mae_shadow / tolerance);
             EXPECT_EQ(some.report.receivers, 200u * 200) << seed;
             EXPECT_LE(some.report.receivers_shaded, some.report.receivers) << seed;
-            EXPECT_EQ(whole.report.receivers, 0u);
         }
     }
-    std::printf("[  MEASURE ] the largest difference is %.2f times the tolerance\n", worst);
+    std::printf("[  MEASURE ] the largest difference is %.2f times the tolerance and what samples are off, the largest mean over shadow pixels %.2f times the tolerance\n", worst, worst_mean);
 }
 
 TEST(Tolerance, SparesMostReceiversUnderAWideLight)
@@ -80,9 +85,9 @@ TEST(Tolerance, SparesMostReceiversUnderAWideLight)
     Scene scene = plates(3, 400);
     scene.light = RectangleLight{.center = {0, 6, 0}, .half_u = {1, 0, 0}, .half_v = {0, 0, -1}, .emission = {}};
     for (const char* kind : {"soft_shadow_map", "soft_shadow_volume"}) {
-        const Mask whole = mask_of(engine, scene, {.kind = kind, .settings = {}}, 0), some = mask_of(engine, scene, {.kind = kind, .settings = {}}, 0.01);
+        const Mask whole = mask_of(engine, scene, {.kind = kind, .settings = {}}, 0), some = mask_of(engine, scene, {.kind = kind, .settings = {}}, 0.06);
         EXPECT_LT(some.report.receivers_shaded, some.report.receivers / 5) << kind;
-        EXPECT_LT(compare(some.visibility, whole.visibility).max, 0.07) << kind;
+        EXPECT_LT(compare(some.visibility, whole.visibility).max, 0.06) << kind;
     }
 }
 
@@ -103,7 +108,7 @@ TEST(Tolerance, RaysAreThoseOfTheWholeMask)
 {
     const Engine engine;
     const Scene scene = plates(7, 128);
-    const Mask whole = mask_of(engine, scene, {.kind = "ray_traced", .settings = {{"samples", std::int64_t{64}}}}, 0), some = mask_of(engine, scene, {.kind = "ray_traced", .settings = {{"samples", std::int64_t{64}}}}, 0.001);
+    const Mask whole = mask_of(engine, scene, {.kind = "ray_traced", .settings = {{"samples", std::int64_t{64}}}}, 0), some = mask_of(engine, scene, {.kind = "ray_traced", .settings = {{"samples", std::int64_t{64}}}}, 0.006);
     std::size_t same = 0;
     for (std::size_t i = 0; i < whole.visibility.pixels.size(); ++i) same += whole.visibility.pixels[i] == some.visibility.pixels[i];
     EXPECT_GE(same, some.report.receivers_shaded);

@@ -26,7 +26,7 @@ struct SoftShadowMap {
     bool project = false;                            // shade in the light's view and sample that mask from the receivers' camera (3.1)
     int project_resolution = 512;                    // of that mask
     // What computing less may add to a pixel's error: fewer receivers (docs/tolerance.md), and of the union coarser patches. 0: everything is computed.
-    double tolerance = 0.005;
+    double tolerance = 0.03;
 };
 
 } // namespace penumbra
