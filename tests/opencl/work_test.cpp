@@ -288,6 +288,58 @@ TEST(Work, CompilingIsAStageOfItsOwn)
     EXPECT_LE(stage_of(stages, "shade").ms + stage_of(stages, "compile").ms, wall);
 }
 
+// Waits for that, up to a minute.
+template <class Holds> bool comes(const Holds& holds)
+{
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+    while (!holds() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    return holds();
+}
+
+// Whoever asks for the stop can tell a compiler, which nothing stops, from a kernel that looks: at the first launch one follows the other.
+TEST(Work, IsDeafWhileItCompilesOnly)
+{
+    const TemporaryFolder folder;
+    Device device;
+    // No cache has it, and a compiler takes its time.
+    std::string text = "// " + folder.path() + "\n";
+    for (int i = 0; i < 200; ++i) text += "float f" + std::to_string(i) + "(float x) { for (int i = 0; i < 9; ++i) x = sin(x) + pow(x, " + std::to_string(i) + ".5f); return x; }\n";
+    text += "__kernel void patient(__global const volatile int* stop, __global float* out) { float x = out[0]; while (!*stop) {} ";
+    for (int i = 0; i < 200; ++i) text += "x = f" + std::to_string(i) + "(x); ";
+    text += "out[0] = x; }";
+
+    Stop stop;
+    const StopScope scope(stop);
+    bool building = false, launching = false, running = false;
+    std::jthread other([&] {
+        building = comes([&] { return stop.deaf(); });
+        launching = comes([&] { return !stop.deaf(); }) && comes([&] { return stop.deaf(); });
+        running = comes([&] { return !stop.deaf(); });
+        stop.ask();
+    });
+    Work work(device.context);
+    const auto out = work.upload<float>(ramp(1), "out");
+    ASSERT_TRUE(work.stop()());
+    work.launch(device.kernel(text, "patient"), "patient", {1, 1}, {1, 1}, 4, work.stop(), out);
+    EXPECT_THROW(work.finish(), Stopped);
+    other.join();
+    EXPECT_TRUE(building);
+    EXPECT_TRUE(launching);
+    EXPECT_TRUE(running) << "the kernel is no compiler";
+}
+
+TEST(Work, CompilesNothingOnceItIsToStop)
+{
+    const TemporaryFolder folder;
+    Device device;
+    Stop stop;
+    stop.ask();
+    const StopScope scope(stop);
+    EXPECT_THROW(device.kernel("__kernel void one() {} // " + folder.path(), "one"), Stopped);
+    EXPECT_FALSE(stop.deaf());
+    EXPECT_EQ(device.programs.built_from_source(), 0);
+}
+
 TEST(Work, OutsideAnyStage)
 {
     Device device;
