@@ -38,9 +38,9 @@ export class Follower {
   #rest_timer = 0;
   /** Counts changes: a mask belongs to one. */
   version = 0;
-  /** What is seen. `refused`: the service had an error for what was asked for last. */
+  /** What is seen. `refused`: the service had an error for what was asked for last; `refused_in_full`: the version of the last that was no draft. */
   shown = {
-    a: /** @type {MaskReply | null} */ (null), a_version: -1, a_of: /** @type {Of | null} */ (null), draft: false, refused: false,
+    a: /** @type {MaskReply | null} */ (null), a_version: -1, a_of: /** @type {Of | null} */ (null), draft: false, refused: false, refused_in_full: -1,
     b: /** @type {MaskReply | null} */ (null), b_version: -1, b_of: /** @type {Of | null} */ (null),
   };
   /** Masks of earlier versions come too late: they are of another scene. */
@@ -167,8 +167,8 @@ export class Follower {
       const { reply, mask } = await this.#ask(choice, draft !== null);
       // The light has gone on, and its draft is there already.
       if (this.#too_late(asked, shown.a_version)) return;
-      // What it stands in for is there already.
-      if (draft && shown.a_version === asked && !shown.draft && !shown.refused) return;
+      // What it stands in for is there already, or is refused: the error is what the user should read.
+      if (draft && (shown.refused_in_full === asked || (shown.a_version === asked && !shown.draft && !shown.refused))) return;
       if (JSON.stringify(a) === JSON.stringify(this.page.state().a)) this.#taken_ms[draft ? "draft" : "full"] = reply.ms;
       this.view.a = mask;
       Object.assign(shown, { a: reply, a_version: asked, a_of: { choice, source, light }, draft: draft !== null, refused: false });
@@ -194,6 +194,7 @@ export class Follower {
     const kept = shown.a !== null && shown.a_of !== null && same_scene(shown.a_of.source, source);
     if (!kept) shown.a = null;
     Object.assign(shown, { a_version: asked, refused: !drafted });
+    if (!draft) shown.refused_in_full = asked;
     this.page.failed(error, drafted ? `${choice.kind}: ` : "", kept);
   }
 

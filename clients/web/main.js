@@ -43,6 +43,8 @@ let a = { kind: FIRST.a, settings: {} };
 /** @type {Choice} */
 let b = { kind: FIRST.b, settings: {} };
 let said_timer = 0;
+/** What the problem that is shown is of. @type {"start" | "mask" | "scene" | "download"} */
+let problem_of = "start";
 
 /** @param {string} text */
 function say(text) {
@@ -51,8 +53,9 @@ function say(text) {
   said_timer = setTimeout(() => (by_id("said").textContent = ""), SAID_MS);
 }
 
-/** @param {unknown} error @param {string} [whose] @param {boolean} [kept] the last mask stays in sight: no reason for alarm */
-function fail(error, whose = "", kept = false) {
+/** @param {typeof problem_of} of @param {unknown} error @param {string} [whose] @param {boolean} [kept] the last mask stays in sight: no reason for alarm */
+function fail(of, error, whose = "", kept = false) {
+  problem_of = of;
   if (error instanceof ServiceError && error.status === 401) {
     by_id("token_form").hidden = false;
     by_id("token").focus();
@@ -62,6 +65,12 @@ function fail(error, whose = "", kept = false) {
   box.classList.toggle("calm", kept);
   box.setAttribute("role", kept ? "status" : "alert");
   box.hidden = false;
+}
+
+/** It went well: a problem that was of this is none any more. A mask that comes says nothing of a file that was refused.
+ * @param {typeof problem_of} of */
+function went_well(of) {
+  if (problem_of === of) by_id("problem").hidden = true;
 }
 
 const outage = new Outage((text) => {
@@ -113,7 +122,7 @@ const follower = new Follower(view, outage, busy, {
       by_id("mask").dataset.versionB = String(follower.shown.b_version);
       return;
     }
-    by_id("problem").hidden = true;
+    went_well("mask");
     by_id("rate").textContent = rate.tick(performance.now());
     // Announced to scripts and tests: this version of the state is on the screen, as a draft or in full.
     by_id("mask").dataset.version = String(follower.shown.a_version);
@@ -121,7 +130,7 @@ const follower = new Follower(view, outage, busy, {
   },
   failed: (error, whose, kept) => {
     by_id("mask").dataset.refused = String(follower.shown.a_version);
-    fail(error, whose, kept);
+    fail("mask", error, whose, kept);
   },
 });
 const stage = new Stage(view, follower, { state, light: () => light });
@@ -230,9 +239,10 @@ const share = new SharePanel(by_id("share"), {
       const reply = await client.mask(scene_json(source, light, a), source.files, media_type, image);
       save(new Blob([reply.buffer], { type: media_type }), `${image}.${extension}`);
       say(`${image}.${extension} saved`);
+      went_well("download");
     } catch (error) {
       say("");
-      fail(error);
+      fail("download", error);
     }
   },
   download_picture: () => by_id("mask").toBlob((/** @type {Blob} */ blob) => {
@@ -249,12 +259,13 @@ const source_panel = new SourcePanel(by_id("source"), {
   },
   use_picture: (picture) => {
     use_picture(picture);
+    went_well("scene");
     stage.show();
   },
   look: (name, file, encoding, fov_deg) => steadily(`reading ${name}`, () => depth_view(client, name, file, encoding, fov_deg)),
   failed: (error) => {
     say("");
-    fail(error);
+    fail("scene", error);
   },
 });
 
@@ -324,7 +335,7 @@ async function begin() {
     b = known(FIRST.b, 1);
     use(source);
   } catch (error) {
-    fail(error);
+    fail("start", error);
   }
 }
 

@@ -53,7 +53,9 @@ export class SourcePanel {
         this.show();
         this.place.querySelector("select")?.focus();
         this.lit = undefined;
-        if (kind === "courtyard") this.page.use(courtyard_source());
+        if (kind !== "courtyard") return;
+        this.#wanted++;
+        this.page.use(courtyard_source());
       },
     );
     this.place.replaceChildren(pick.node);

@@ -9,6 +9,7 @@
 #include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
 #include "opencl/program_text.hpp"
+#include "scene/stop.hpp"
 
 namespace penumbra::opencl {
 namespace {
@@ -128,6 +129,7 @@ cl::Program ProgramCache::build_from_source(const std::string& name, const std::
 {
     cl::Program program = translated(name, [&] { return cl::Program(context_, text); });
     if (driver_keeps_) driver_cache().require_room();
+    const Deaf compiling(current_stop());
     try {
         program.build(device_, build_options);
     } catch (const cl::Error& error) {

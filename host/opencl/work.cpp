@@ -25,6 +25,20 @@ double device_milliseconds(const cl::Event& event)
     return end > start ? static_cast<double>(end - start) * 1e-6 : 0.0;
 }
 
+// From when the device begins with the work there is no compiler in its way.
+void end_when_it_runs(cl::Event& event, std::shared_ptr<Deaf> deaf)
+{
+    auto kept = std::make_unique<std::shared_ptr<Deaf>>(std::move(deaf));
+    event.setCallback(
+        CL_RUNNING,
+        [](cl_event, cl_int, void* data) {
+            const std::unique_ptr<std::shared_ptr<Deaf>> its(static_cast<std::shared_ptr<Deaf>*>(data));
+            (*its)->end();
+        },
+        kept.get());
+    static_cast<void>(kept.release()); // the callback's
+}
+
 // "64 x 32"
 std::string shape_text(const std::array<std::size_t, 2>& shape) { return std::to_string(shape[0]) + " x " + std::to_string(shape[1]); }
 
@@ -326,10 +340,13 @@ void Work::enqueue(cl::Kernel& kernel, const char* name, std::array<std::size_t,
         const bool own = std::any_of(kernels_.begin(), kernels_.end(), [&](const OwnKernel& one) { return one.kernel() == kernel(); });
         if (!known && own) launched_.push_back({kernel(), local});
         const Clock::time_point start = Clock::now();
+        const auto compiling = first ? std::make_shared<Deaf>(stop_) : nullptr;
         queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(whole[0], whole[1]), cl::NDRange(local[0], local[1]), nullptr,
                                     new_event());
         if (first) {
+            end_when_it_runs(events_.back().second, compiling);
             queue_.finish();
+            compiling->end();
             compile_ms_ += std::max(0.0, milliseconds_since(start) - device_milliseconds(events_.back().second));
         }
     } catch (const cl::Error& error) {

@@ -31,7 +31,7 @@ constexpr std::array names{
     Name{"penumbra_workers", "gauge", "Processes that compute, by what they do."},
     Name{"penumbra_workers_started_total", "counter", "Workers that became ready."},
     Name{"penumbra_workers_crashed_total", "counter", "Workers that died by themselves."},
-    Name{"penumbra_workers_overdue_total", "counter", "Workers that were ended at a request's deadline."},
+    Name{"penumbra_workers_overdue_total", "counter", "Workers that did not stop at a request's deadline, and were ended."},
     Name{"penumbra_kept_scenes", "gauge", "Scenes that are kept."},
     Name{"penumbra_kept_scene_bytes", "gauge", "Memory of all kept scenes, on the device as well."},
     Name{"penumbra_kept_device_bytes", "gauge", "What kept scenes have prepared on the device."},

@@ -17,6 +17,12 @@ Problem Deadline::over() const
     return Problem(504, "deadline", "the request's " + std::to_string(seconds) + " s were over while it was computed; expected less work: fewer samples, smaller maps, a smaller mask");
 }
 
+Problem Deadline::over_compiling() const
+{
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit_).count();
+    return Problem(504, "deadline", "the request's " + std::to_string(seconds) + " s were over while kernels for its settings were compiled; expected a service that has less to do, or settings closer to a preset", 1);
+}
+
 bool Gate::full() const
 {
     const std::scoped_lock lock(mutex_);

@@ -25,6 +25,8 @@ public:
     void check(std::string_view next) const;
     // The Problem 504 of what was stopped on its way.
     Problem over() const;
+    // The same, where kernels for it were compiled.
+    Problem over_compiling() const;
 
 private:
     Clock::duration limit_;

@@ -1,6 +1,7 @@
 #include "process/watch.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace penumbra::server {
 
@@ -17,7 +18,7 @@ Watch::Guard::~Guard()
     watch_.watched_.erase(&stop_);
 }
 
-Watch::Watch() : thread_([this] { run(); }) {}
+Watch::Watch(std::function<void()> deaf) : deaf_(std::move(deaf)), thread_([this] { run(); }) {}
 
 Watch::~Watch()
 {
@@ -52,6 +53,7 @@ void Watch::run()
             const Time end = std::min(at->second, end_);
             if (end <= now) {
                 at->first->ask();
+                if (at->first->deaf()) deaf_();
                 at = watched_.erase(at);
             } else {
                 next = std::min(next, end);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <thread>
 #include <unordered_map>
@@ -12,11 +13,15 @@
 
 namespace penumbra::server {
 
+// The exit code of a worker whose time is up where nothing can stop it but its end: its driver compiles.
+constexpr int ended_at_deadline = 75;
+
 // Safe to use from several threads at once.
 class Watch {
 public:
     using Time = Deadline::Clock::time_point;
-    Watch();
+    // `deaf` is called, from a thread of this, when the time of work is up that is in a call that nothing can stop.
+    explicit Watch(std::function<void()> deaf = [] {});
     ~Watch();
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
@@ -48,6 +53,7 @@ private:
     std::unordered_map<Stop*, Time> watched_; // that were not asked to stop yet
     Time end_ = Time::max();                  // of all
     bool over_ = false;
+    const std::function<void()> deaf_;
     std::thread thread_;
 };
 

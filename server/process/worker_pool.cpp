@@ -19,6 +19,7 @@
 #include "process/priority.hpp"
 #include "process/problem.hpp"
 #include "process/wait.hpp"
+#include "process/watch.hpp"
 
 extern char** environ;
 
@@ -266,14 +267,15 @@ void WorkerPool::spawn(Worker& worker, bool builder)
     worker.channel = std::move(ours);
 }
 
-// With the mutex. The process ends, its place is free to be taken again.
-void WorkerPool::bury(Worker& worker, End end)
+// With the mutex. The process ends, its place is free to be taken again. Gives how it ended: one that ended at its deadline by itself is retired.
+WorkerPool::End WorkerPool::bury(Worker& worker, End end)
 {
     if (worker.process > 0) {
         kill(worker.process, SIGKILL);
         int status = 0;
         while (waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
         }
+        if (end == End::crashed && WIFEXITED(status) && WEXITSTATUS(status) == ended_at_deadline) end = End::retired;
         if (end == End::overdue)
             ++counts_.overdue;
         else if (end == End::crashed && !over()) {
@@ -296,6 +298,7 @@ void WorkerPool::bury(Worker& worker, End end)
     worker.pause = young ? std::clamp(worker.pause * 2, first_pause, longest_pause) : std::chrono::milliseconds(0);
     worker.not_before = Clock::now() + worker.pause;
     worker.used = Clock::time_point::min();
+    return end;
 }
 
 // With the mutex. Those that died while nobody asked them for anything: an idle one never says a word, so that its channel has one to read
@@ -363,7 +366,7 @@ Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, 
     const auto begun = Clock::now();
     const auto used_before = processor_time(worker_->process);
     auto step = steps_down.begin();
-    bool said = !is_long;
+    bool said = !is_long, hurried = false;
     for (;;) {
         const auto now = Clock::now();
         Clock::time_point end = deadline.end() == Clock::time_point::max() ? deadline.end() : deadline.end() + pool_->options_.grace;
@@ -372,6 +375,13 @@ Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, 
             end = std::min(end, pool_->end_);
         }
         if (now >= end) return Channel::Got::late;
+        // It is to stop now, and to say so within the grace: not on what the others leave.
+        if (now >= deadline.end() && !hurried) {
+            hurried = true;
+            step = steps_down.end();
+            if (lowered_ && pool_->raises_) lower_priority(worker_->process, 0);
+        }
+        if (!hurried) end = std::min(end, deadline.end());
         end = std::min(end, now + std::chrono::milliseconds(100)); // the service's end is looked for now and then: it shortens the wait
         if (step != steps_down.end()) {
             const auto left = step->after - (processor_time(worker_->process) - used_before);
@@ -410,10 +420,11 @@ Message WorkerPool::Lease::call(std::string_view text, std::span<const int> file
         return answer;
     }
     const bool late = got == Channel::Got::late, ended = Clock::now() >= pool_->end_;
-    pool_->bury(worker, late ? End::overdue : End::crashed);
+    const End end = pool_->bury(worker, late ? End::overdue : End::crashed);
     pool_->changed_.notify_all();
     if (ended) throw service_ends();
     if (late) throw deadline.over();
+    if (end == End::retired) throw deadline.over_compiling();
     throw Problem(500, "crashed", "the process that computed this ended; others in flight did not notice. The log has the request's digest");
 }
 

@@ -103,7 +103,7 @@ public:
 
     struct Counts {
         std::size_t starting = 0, idle = 0, busy = 0;
-        std::uint64_t started = 0, crashed = 0, overdue = 0, buried = 0; // so far; overdue: ended at a deadline; buried: all that ended
+        std::uint64_t started = 0, crashed = 0, overdue = 0, buried = 0; // so far; overdue: did not stop at a deadline; buried: all that ended
         Clock::duration since_finished{};                    // the last call
     };
     Counts counts() const;
@@ -121,7 +121,7 @@ private:
     bool has_time() const;
     void spawn(Worker& worker, bool builder);
     void bury_the_dead();
-    void bury(Worker& worker, End end);
+    End bury(Worker& worker, End end);
     Worker* next_dead(Clock::time_point& when);
     void say_death(const Worker& worker, int status) const;
     std::string folder_of(const Worker& worker) const;

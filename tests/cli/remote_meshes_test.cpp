@@ -3,7 +3,6 @@
 #include <array>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 
 #include <nlohmann/json.hpp>
 
@@ -71,10 +70,9 @@ protected:
         gltf["images"][1]["uri"] = image;
         write_text(path(name), gltf.dump());
     }
-    Ran remote(const std::string& scene)
+    Ran remote(const std::string& scene, const std::vector<std::string>& options = {"--allow-meshes"})
     {
-        if (!server) server = std::make_unique<ServerProgram>(std::vector<std::string>{"--allow-meshes"});
-        return penumbra({"mask", scene, "-o", path("remote.pfm"), "--server", server->url}, with_token);
+        return penumbra({"mask", scene, "-o", path("remote.pfm"), "--server", shared_server(options)}, with_token);
     }
     // The service computes what is computed here. Returns how much of the floor is in shadow.
     double expect_same(const std::string& scene)
@@ -89,7 +87,6 @@ protected:
         for (const float v : mask.pixels) dark += 1 - v;
         return 16 * dark / static_cast<double>(mask.pixels.size());
     }
-    std::unique_ptr<ServerProgram> server;
 };
 
 constexpr double square = 4, half = 2, pixel_rows = 0.2;
@@ -157,8 +154,7 @@ TEST_F(RemoteMeshes, AServiceThatTakesNoneSaysSo)
 {
     write_gltf("square.gltf", "my%20mesh.bin", "leaf.png");
     write_picture("leaf.png", true);
-    server = std::make_unique<ServerProgram>();
-    expect_one_error(remote(write_scene_of({{{"mesh", "square.gltf"}, {"receives", false}}})), 2, {"scene.json", "--allow-meshes"});
+    expect_one_error(remote(write_scene_of({{{"mesh", "square.gltf"}, {"receives", false}}}), {}), 2, {"scene.json", "--allow-meshes"});
 }
 
 } // namespace

@@ -1,6 +1,5 @@
 // penumbra mask --server, against the real service and one that answers by script.
 #include <algorithm>
-#include <memory>
 
 #include <nlohmann/json.hpp>
 
@@ -17,10 +16,9 @@ const Environment with_token{{"PENUMBRA_SERVER_TOKEN", server_token}};
 
 class RemoteMaskCommand : public CommandTest {
 protected:
-    Ran remote(Arguments arguments, const Environment& environment = with_token)
+    static Ran remote(Arguments arguments, const Environment& environment = with_token, const std::vector<std::string>& options = {})
     {
-        if (!server) server = std::make_unique<ServerProgram>();
-        arguments.insert(arguments.end(), {"--server", server->url});
+        arguments.insert(arguments.end(), {"--server", shared_server(options)});
         return penumbra(arguments, environment);
     }
     // write_scene's, through depth images in a folder: what a service takes.
@@ -45,7 +43,6 @@ protected:
         write_image(path("picture.png"), picture, {.format = "png", .bits = 8});
         return path("picture.png");
     }
-    std::unique_ptr<ServerProgram> server;
 };
 
 TEST_F(RemoteMaskCommand, TheSameBytesAsHere)
@@ -186,9 +183,8 @@ TEST_F(RemoteMaskCommand, MeshesWhereTheServiceTakesThem)
         "objects": [{"mesh": "t.obj", "receives": false},
                     {"quad": {"center": [0, 0, 0], "half_u": [4, 0, 0], "half_v": [0, 0, -4]}, "casts": false}],
         "receivers": {"resolution": [40, 31]}})");
-    server = std::make_unique<ServerProgram>(std::vector<std::string>{"--allow-meshes"});
     EXPECT_EQ(penumbra({"mask", path("scene.json"), "-o", path("local.pfm")}).code, 0);
-    const Ran ran = remote({"mask", path("scene.json"), "-o", path("remote.pfm")});
+    const Ran ran = remote({"mask", path("scene.json"), "-o", path("remote.pfm")}, with_token, {"--allow-meshes"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     expect_same_bytes(path("local.pfm"), path("remote.pfm"));
 }

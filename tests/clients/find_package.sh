@@ -7,7 +7,7 @@ rm -rf "$build"
 mkdir -p "$build"
 sed -n '/^```cpp/,/^```/p' "$docs" | sed '/^```/d' >"$build/docs.cpp"
 grep -q 'int main' "$build/docs.cpp"
-"$cmake" -S "$source" -B "$build" -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Debug
+"$cmake" -S "$source" -B "$build" -DCMAKE_CXX_COMPILER="$cxx" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0
 grep "^penumbra_client_DIR:PATH=$prefix/" "$build/CMakeCache.txt" # not a copy that is installed elsewhere
 "$cmake" --build "$build"
 if ldd "$build/consumer" | grep libpenumbra; then

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <csignal>
+#include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -68,5 +70,14 @@ private:
     int errors_ = -1;
     std::thread reader_;
 };
+
+// The address of one with these options, for all tests of the process that need none of their own. It ends with the process.
+inline const std::string& shared_server(const std::vector<std::string>& arguments = {})
+{
+    static std::map<std::vector<std::string>, std::unique_ptr<ServerProgram>> running;
+    std::unique_ptr<ServerProgram>& server = running[arguments];
+    if (!server) server = std::make_unique<ServerProgram>(arguments);
+    return server->url;
+}
 
 } // namespace penumbra::test

@@ -3,6 +3,9 @@
     extremes.py SERVER [--count N] [--first N] [--seed N]
 
 N: 200, or 100000 with PENUMBRA_HOSTILE=long in the environment. A failure names the number that makes its scene again. Exit: 0 all held, 1 not.
+
+A 504 is an answer. A worker that did not stop at the deadline is a fault where the scene, sent again while nothing else is, does so again: half a
+second of grace may pass without a machine that does other things too.
 """
 
 import argparse
@@ -106,13 +109,20 @@ def main():
                     failures.append(number)
                     print(f"extremes: --seed {options.seed} --first {number} --count 1: {wrong}", file=sys.stderr, flush=True)
         crashed, overdue = (int(service.metric(f"penumbra_workers_{what}_total")) for what in ("crashed", "overdue"))
+        if overdue:
+            for number in sorted(set(late)):
+                one(number)
+            again = int(service.metric("penumbra_workers_overdue_total")) - overdue
+            if again:
+                failures.append(late)
+                print(f"extremes: --seed {options.seed}, of {sorted(set(late))}: {again} workers did not stop at the deadline", file=sys.stderr, flush=True)
     seconds = time.monotonic() - begun
     print(f"{options.count} scenes from {options.first} of seed {options.seed}, {sum(counts.values())} answers in {seconds:.0f} s: "
           + ", ".join(f"{count} times {status}" for status, count in sorted(counts.items())) + f"; {crashed} workers crashed, {overdue} were overdue" + (f"; over the {DEADLINE} s: {late[:20]}" if late else ""))
     if not counts[200] or service.code != 0:
         print(f"extremes: {counts[200]} masks, exit code {service.code}", file=sys.stderr)
         return 1
-    return 1 if failures or crashed or overdue else 0
+    return 1 if failures or crashed else 0
 
 
 if __name__ == "__main__":

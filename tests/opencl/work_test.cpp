@@ -288,6 +288,65 @@ TEST(Work, CompilingIsAStageOfItsOwn)
     EXPECT_LE(stage_of(stages, "shade").ms + stage_of(stages, "compile").ms, wall);
 }
 
+// Waits for that, up to a minute.
+template <class Holds> bool comes(const Holds& holds)
+{
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+    while (!holds() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    return holds();
+}
+
+// Whoever asks for the stop can tell a compiler, which nothing stops, from a kernel that looks, at its first launch too.
+TEST(Work, IsDeafWhileItCompilesOnly)
+{
+    const TemporaryFolder folder;
+    Device device;
+    // No cache has it, and a compiler takes its time.
+    std::string text = "__constant char where[] = \"" + folder.path() + "\";\n"; // a comment is not in the driver's key
+    for (int i = 0; i < 1000; ++i) text += "float f" + std::to_string(i) + "(float x) { for (int i = 0; i < 9; ++i) x = sin(x) + pow(x, " + std::to_string(i) + ".5f); return x; }\n";
+    text += "__kernel void patient(__global const volatile int* stop, __global float* out) { float x = out[0]; while (!*stop) {} ";
+    for (int i = 0; i < 20; ++i) text += "x = f" + std::to_string(i) + "(x); ";
+    text += "out[0] = x; }";
+
+    Stop stop;
+    const StopScope scope(stop);
+    Work work(device.context);
+    const auto out = work.upload<float>(ramp(1), "out");
+    ASSERT_TRUE(work.stop()());
+    const auto deaf = [&] { return stop.deaf(); };
+    bool building = false, running = false;
+    std::jthread first([&] { building = comes(deaf); });
+    const cl::Kernel kernel = device.kernel(text, "patient");
+    first.join();
+    EXPECT_TRUE(building);
+    EXPECT_FALSE(stop.deaf());
+
+    std::jthread second([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300)); // within the launch, as a rule
+        running = comes([&] { return !stop.deaf(); });
+        stop.ask();
+    });
+    const auto run = [&] {
+        work.launch(kernel, "patient", {1, 1}, {1, 1}, 4, work.stop(), out);
+        work.finish();
+    };
+    EXPECT_THROW(run(), Stopped);
+    second.join();
+    EXPECT_TRUE(running) << "the kernel is no compiler";
+}
+
+TEST(Work, CompilesNothingOnceItIsToStop)
+{
+    const TemporaryFolder folder;
+    Device device;
+    Stop stop;
+    stop.ask();
+    const StopScope scope(stop);
+    EXPECT_THROW(device.kernel("__kernel void one() {} // " + folder.path(), "one"), Stopped);
+    EXPECT_FALSE(stop.deaf());
+    EXPECT_EQ(device.programs.built_from_source(), 0);
+}
+
 TEST(Work, OutsideAnyStage)
 {
     Device device;

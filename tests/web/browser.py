@@ -123,9 +123,14 @@ class PageTest(unittest.TestCase):
         cls.browser.set_script_timeout(WAIT_S)
 
     def setUp(self):
+        self.open(self.server)
+
+    def open(self, server):
+        """The page, with its first mask in full: on a slow machine another technique's stands in before."""
         self.resize(1440, 960)
-        self.browser.get(self.server.url + "/")
-        self.wait_for("return document.getElementById('mask').dataset.version")
+        self.browser.get(server.url + "/")
+        self.wait_for("const d = document.getElementById('mask').dataset; "
+                      "return d.version && d.version === d.asked && document.getElementById('name_a').hidden")
 
     # The page's console holds no errors but those that a test expects and takes itself.
     def tearDown(self):
@@ -164,6 +169,26 @@ class PageTest(unittest.TestCase):
 
     def problem(self):
         return self.js("const box = document.getElementById('problem'); return box.hidden ? '' : box.textContent")
+
+    def record(self, name):
+        """From now on, each text of this element: what stands for a moment only is missed by who looks now and then. `said` gives them."""
+        self.js(
+            """
+            const node = document.getElementById(arguments[0]), texts = [];
+            window.said = {...window.said, [arguments[0]]: texts};
+            new MutationObserver(() => {
+                const text = node.hidden ? "" : node.textContent;
+                if (texts.at(-1) !== text) texts.push(text);
+            }).observe(node, {childList: true, characterData: true, subtree: true, attributes: true, attributeFilter: ["hidden"]});
+            """,
+            name,
+        )
+
+    def said(self, name):
+        return self.js("return window.said[arguments[0]]", name)
+
+    def wait_until_said(self, name, pattern):
+        self.wait_for("return window.said[arguments[0]].some((text) => new RegExp(`^${arguments[1]}$`).test(text))", name, pattern)
 
     def version(self):
         return int(self.js("return document.getElementById('mask').dataset.version"))

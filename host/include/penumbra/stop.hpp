@@ -6,7 +6,8 @@
 //     penumbra::Mask mask = engine.mask(scene);     stop.ask();
 //
 // What a thread does within the scope then throws Stopped, in milliseconds as a rule: loops on the host look between rows, kernels between
-// tiles. Kernels look where the device works in the host's own memory (PoCL); elsewhere a launch that runs comes to its end first.
+// tiles. Kernels look where the device works in the host's own memory (PoCL); elsewhere a launch that runs comes to its end first. A driver that
+// compiles cannot be stopped: deaf() tells.
 #pragma once
 
 #include <atomic>
@@ -26,6 +27,7 @@ public:
 // What loops and kernels look at. Alone on its cache line, as drivers want memory that they share.
 struct alignas(128) StopWord {
     std::atomic<int> asked = 0;
+    std::atomic<int> deaf = 0; // calls that nothing can stop
 };
 
 // Safe to use from several threads at once.
@@ -34,6 +36,8 @@ public:
     Stop() : word_(std::make_shared<StopWord>()) {}
     void ask() noexcept { word_->asked = 1; }
     bool asked() const noexcept { return word_->asked != 0; }
+    // Whether the work is in a call that nothing can stop: a driver compiles, for seconds perhaps. Once it was asked to stop it begins none.
+    bool deaf() const noexcept { return word_->deaf != 0; }
     const std::shared_ptr<StopWord>& word() const { return word_; }
 
 private:

@@ -130,13 +130,13 @@ TEST(Refusals, OfWorkThatIsTooMuch)
 TEST(Refusals, BodiesThatEndOrStop)
 {
     const std::string body = form(parts());
-    Running impatient{server::Options{.device = {}, .token = {}, .deadline_s = 1}};
     {
-        Socket socket(impatient.port);
+        Socket socket(shared_port());
         socket.send(post(body).substr(0, 400));
         socket.end();
         expect_problem(Reply(socket.receive()), 400, "ended after", "truncated");
     }
+    Running impatient{server::Options{.device = {}, .token = {}, .deadline_s = 1}};
     Socket socket(impatient.port);
     socket.send(post(body).substr(0, 400)); // and then nothing: the deadline answers
     expect_problem(Reply(socket.receive()), 408, "within 1 s", "stopped");
