@@ -100,32 +100,95 @@ __kernel void texels_of_map(const int2 size, const int begin, __global const flo
     texels[begin + y * size.x + x] = (float2)(d, d > 0.0f ? 1.0f : 0.0f);
 }
 
-// surfaces_of_texels: a larger map at a lower resolution, the nearest surface of each texel alone: what it covers of the texel, as a rectangle.
+// disparities_of_map: what surfaces_of_texels reads, several times each.
+__kernel void disparities_of_map(const int count, __global const float* restrict depth, __global float* restrict disparities)
+{
+    const int at = get_global_id(0);
+    if (at < count) disparities[at] = disparity_of(depth[at]);
+}
+
+// The samples of a larger map whose centres lie in a texel.
+typedef struct {
+    int2 from, first, last;
+    __global const float* disparities;
+} Samples;
+inline float sample_at(const Samples samples, const int i, const int j) { return samples.disparities[j * samples.from.x + i]; }
+
+// One surface of a texel: the mean of its samples' disparities, what it covers as a share and as a rectangle, and its least disparity.
+typedef struct {
+    float d, share, least;
+    float4 part;
+} Surface;
+
+// The nearest surface of a texel below a disparity: from the nearest sample there on, as long as the next is no more than `gap` behind. It lies where those
+// samples do and has their share of the texel as its area. d 0: there is none.
+inline Surface surface_below(const Samples samples, const float limit, const float gap)
+{
+    Surface surface = {0.0f, 0.0f, 0.0f, (float4)(0.0f)};
+    float nearest = 0.0f;
+    for (int j = samples.first.y; j < samples.last.y; ++j)
+        for (int i = samples.first.x; i < samples.last.x; ++i) {
+            const float d = sample_at(samples, i, j);
+            nearest = d < limit && d > nearest ? d : nearest;
+        }
+    if (nearest == 0.0f) return surface;
+    float least = nearest, before = MAXFLOAT;
+    while (least < before) {
+        before = least;
+        for (int j = samples.first.y; j < samples.last.y; ++j)
+            for (int i = samples.first.x; i < samples.last.x; ++i) {
+                const float d = sample_at(samples, i, j);
+                least = d > 0.0f && d >= before - gap && d < least ? d : least;
+            }
+    }
+
+    int count = 0;
+    float sum = 0.0f;
+    int2 low = samples.last, high = samples.first, places = (int2)(0);
+    for (int j = samples.first.y; j < samples.last.y; ++j)
+        for (int i = samples.first.x; i < samples.last.x; ++i) {
+            const float d = sample_at(samples, i, j);
+            if (!(d > 0.0f && d >= least && d < limit)) continue;
+            ++count;
+            sum += d;
+            low = min(low, (int2)(i, j));
+            high = max(high, (int2)(i + 1, j + 1));
+            places += (int2)(2 * i + 1, 2 * j + 1);
+        }
+    const float2 first = convert_float2(samples.first), whole = convert_float2(samples.last - samples.first);
+    surface.d = sum / count;
+    surface.share = count / (whole.x * whole.y);
+    surface.least = least;
+    surface.part = covered_rectangle((convert_float2(low) - first) / whole, (convert_float2(high) - first) / whole, surface.share, (0.5f * convert_float2(places) / count - first) / whole);
+    return surface;
+}
+
+// surfaces_of_texels: a larger map at a lower resolution: the two nearest surfaces of each texel, each with what it covers of it. Means of different surfaces
+// would be none of them, and without the second what lies beside an edge would be lost.
 //
+//   disparities [from.y][from.x]  of the larger map; 0: nothing is there
 //   gap    steps of disparity up to which samples are of one surface
-//   texels, parts [size.y][size.x]  from `begin` on: (mean disparity, covered share); the rectangle: left, right, top, bottom, as MicroPatch has them
-//
-// It lies where the covered samples do and has their share of the texel as its area. Means of different surfaces would be none of them.
-__kernel void surfaces_of_texels(const int2 from, __global const float* restrict depth, const int2 size, const int begin, const float gap, __global float2* restrict texels,
-                                 __global float4* restrict parts)
+//   texels, parts [size.y][size.x]  of the nearest surfaces from `begin` on, of the second ones from `second` on: (mean disparity, covered share); the
+//                                   rectangle: left, right, top, bottom, as MicroPatch has them
+__kernel void surfaces_of_texels(const int2 from, __global const float* restrict disparities, const int2 size, const int begin, const int second, const float gap,
+                                 __global float2* restrict texels, __global float4* restrict parts)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
-    // The samples whose centres lie in the texel.
-    const int2 first = (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y));
-    const int2 last = (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y));
+    const Samples samples = {from, (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y)),
+                             (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y)), disparities};
     float nearest = 0.0f, furthest = MAXFLOAT, all = 0.0f;
     float8 near = (float8)(0.0f), far = (float8)(MAXFLOAT), sums = (float8)(0.0f);
-    for (int j = first.y; j < last.y; ++j) {
-        int i = first.x;
-        for (; i + 8 <= last.x; i += 8) {
-            const float8 z = vload8(0, depth + j * from.x + i), d = disparities_of(z);
+    for (int j = samples.first.y; j < samples.last.y; ++j) {
+        int i = samples.first.x;
+        for (; i + 8 <= samples.last.x; i += 8) {
+            const float8 d = vload8(0, disparities + j * from.x + i);
             near = select(near, d, d > near);
             far = select(far, d, d < far);
             sums += d;
         }
-        for (; i < last.x; ++i) {
-            const float d = disparity_of(depth[j * from.x + i]);
+        for (; i < samples.last.x; ++i) {
+            const float d = sample_at(samples, i, j);
             nearest = d > nearest ? d : nearest;
             furthest = d < furthest ? d : furthest;
             all += d;
@@ -135,42 +198,22 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
     nearest = fmax(nearest, fmax(fmax(near_half.x, near_half.y), fmax(near_half.z, near_half.w)));
     furthest = fmin(furthest, fmin(fmin(far_half.x, far_half.y), fmin(far_half.z, far_half.w)));
     all += (sum_half.x + sum_half.y) + (sum_half.z + sum_half.w);
-    const int at = begin + y * size.x + x;
+    const int at = y * size.x + x;
+    const int2 wide = samples.last - samples.first;
     const bool plain = furthest > 0.0f && nearest - furthest <= gap;
-    if (plain || nearest == 0.0f) {
-        texels[at] = plain ? (float2)(all / ((last.x - first.x) * (last.y - first.y)), 1.0f) : (float2)(0.0f);
-        parts[at] = plain ? (float4)(0.0f, 1.0f, 0.0f, 1.0f) : (float4)(0.0f);
-        return;
+    Surface first = {0.0f, 0.0f, 0.0f, (float4)(0.0f)}, behind = first;
+    if (plain) {
+        first.d = all / (wide.x * wide.y);
+        first.share = 1.0f;
+        first.part = (float4)(0.0f, 1.0f, 0.0f, 1.0f);
+    } else if (nearest > 0.0f) {
+        first = surface_below(samples, INFINITY, gap);
+        behind = surface_below(samples, first.least, gap);
     }
-    // The nearest surface: from the nearest sample on, as long as the next is no more than `gap` behind.
-    float least = nearest, before = MAXFLOAT;
-    while (least < before) {
-        before = least;
-        for (int j = first.y; j < last.y; ++j)
-            for (int i = first.x; i < last.x; ++i) {
-                const float d = disparity_of(depth[j * from.x + i]);
-                least = d > 0.0f && d >= before - gap && d < least ? d : least;
-            }
-    }
-
-    int count = 0;
-    float sum = 0.0f;
-    int2 low = last, high = first, places = (int2)(0);
-    for (int j = first.y; j < last.y; ++j)
-        for (int i = first.x; i < last.x; ++i) {
-            const float d = disparity_of(depth[j * from.x + i]);
-            if (!(d > 0.0f && d >= least)) continue;
-            ++count;
-            sum += d;
-            low = min(low, (int2)(i, j));
-            high = max(high, (int2)(i + 1, j + 1));
-            places += (int2)(2 * i + 1, 2 * j + 1);
-        }
-    const float2 whole = convert_float2(last - first);
-    const float share = count / (whole.x * whole.y);
-    texels[at] = (float2)(sum / count, share);
-    parts[at] = covered_rectangle(convert_float2(low - first) / whole, convert_float2(high - first) / whole, share,
-                                  (0.5f * convert_float2(places) / count - convert_float2(first)) / whole);
+    texels[begin + at] = (float2)(first.d, first.share);
+    parts[begin + at] = first.part;
+    texels[second + at] = (float2)(behind.d, behind.share);
+    parts[second + at] = behind.part;
 }
 
 // --- Patches -----------------

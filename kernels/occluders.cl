@@ -8,12 +8,6 @@ inline float disparity_of(const float depth)
     return as_int(depth) > 0 && as_int(depth) < 0x7f800000 ? fmin(1.0f / depth, MAXFLOAT) : 0.0f;
 }
 
-inline float8 disparities_of(const float8 depth)
-{
-    const int8 there = (as_int8(depth) > 0) & (as_int8(depth) < 0x7f800000);
-    return select((float8)(0.0f), fmin(1.0f / depth, (float8)(MAXFLOAT)), there);
-}
-
 // disparity_from_depth: a map as it is.
 //
 //   depth  [height][width]  planar depth; not finite or not positive: nothing there

@@ -14,6 +14,9 @@
 #include "common/patch_search.clh"
 #include "common/stop.clh"
 
+// Rows of a list share a search while their box is at most so large a part of the light as seen through what is nearest to it.
+#define SEARCH_SHARE 1.0f
+
 // --- Bits -----------------
 
 // 1 / x to 2 units in the last place, x a positive normal number: a linear guess of the bits and three Newton steps, a third of a division's time.
@@ -191,19 +194,33 @@ inline bool all_hidden(const uintn* bits, const floatn d)
 }
 
 // The box of LANES receivers, as tile_bounds has it of a tile's.
-inline float8 box_of(__global const float* xi, __global const float* eta, __global const float* d)
+inline float8 box_of(const Receivers* r)
 {
-    float8 box = (float8)(NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, -NO_RECEIVER, NO_RECEIVER, 0.0f, 0.0f, 0.0f);
-    for (int lane = 0; lane < LANES; ++lane) {
-        if (d[lane] == NO_RECEIVER) continue;
-        box.s0 = xi[lane] < box.s0 ? xi[lane] : box.s0;
-        box.s1 = xi[lane] > box.s1 ? xi[lane] : box.s1;
-        box.s2 = eta[lane] < box.s2 ? eta[lane] : box.s2;
-        box.s3 = eta[lane] > box.s3 ? eta[lane] : box.s3;
-        box.s4 = d[lane] < box.s4 ? d[lane] : box.s4;
-        box.s5 = d[lane] > box.s5 ? d[lane] : box.s5;
+    const floatn most = (floatn)(NO_RECEIVER);
+    const intn there = r->d != most;
+    return (float8)(least_lane(select_lanes(most, r->xi, there)), -least_lane(select_lanes(most, -r->xi, there)), least_lane(select_lanes(most, r->eta, there)),
+                    -least_lane(select_lanes(most, -r->eta, there)), least_lane(r->d), -least_lane(select_lanes((floatn)(0.0f), -r->d, there)), 0.0f, 0.0f);
+}
+
+inline float8 both_boxes(const float8 a, const float8 b)
+{
+    return (float8)(fmin(a.s0, b.s0), fmax(a.s1, b.s1), fmin(a.s2, b.s2), fmax(a.s3, b.s3), fmin(a.s4, b.s4), fmax(a.s5, b.s5), 0.0f, 0.0f);
+}
+
+// How many rows of a list, of those from `first` on, one search is for: 1, 2, 4 or 8, as long as they lie close together compared with how far the light is
+// seen through what is nearest to it. Their box comes along.
+inline int rows_of_search(const float8* boxes, const int first, const float nearest, const float2 half_inverse_scale, float8* box)
+{
+    int rows = 1;
+    *box = boxes[first];
+    for (; 2 * rows <= ITEM_ROWS && first % (2 * rows) == 0; rows *= 2) {
+        float8 wider = *box;
+        for (int row = first + rows; row < first + 2 * rows; ++row) wider = both_boxes(wider, boxes[row]);
+        const float2 seen = SEARCH_SHARE * (nearest - wider.s4) * half_inverse_scale;
+        if (wider.s1 - wider.s0 > seen.x || wider.s3 - wider.s2 > seen.y) break;
+        *box = wider;
     }
-    return box;
+    return rows;
 }
 
 // soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `maps` occluder maps of one size.
@@ -229,18 +246,22 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
     const int2 size = (int2)(occluders.width, occluders.height);
     const Levels levels = levels_of(size);
     uint count = 0;
-    const int together = lists ? 1 : ITEM_ROWS;
+    Receivers own[ITEM_ROWS];
+    float8 boxes[ITEM_ROWS];
+    for (int row = 0; row < ITEM_ROWS; ++row) {
+        const int place = (y + row) * receivers.stride + x;
+        own[row].xi = load_lanes(xi + place);
+        own[row].eta = load_lanes(eta + place);
+        own[row].d = load_lanes(d + place);
+        if (lists) boxes[row] = box_of(&own[row]);
+    }
+    int together = ITEM_ROWS;
     for (int top = 0; top < ITEM_ROWS; top += together) {
-        const Search search = {lists ? box_of(xi + (y + top) * receivers.stride + x, eta + (y + top) * receivers.stride + x, d + (y + top) * receivers.stride + x) : bounds[tile],
-                               0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
+        Search search = {bounds[tile], 0.5f / scale, (float2)(occluders.texel_x, occluders.texel_y)};
+        if (lists) together = rows_of_search(boxes, top, nearest, search.half_inverse_scale, &search.box);
         uintn bits[ITEM_ROWS][SIDE];
         bool over[ITEM_ROWS]; // nothing is left to hide
-        Receivers own[ITEM_ROWS];
         for (int row = 0; row < together; ++row) {
-            const int place = (y + top + row) * receivers.stride + x;
-            own[row].xi = load_lanes(xi + place);
-            own[row].eta = load_lanes(eta + place);
-            own[row].d = load_lanes(d + place);
             for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(~light_rows[k]);
             over[row] = false;
         }
@@ -265,8 +286,8 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     if (!has_limits) {
                         for (int row = 0; row < together; ++row) {
                             const int place = (y + top + row) * receivers.stride + x;
-                            own[row].limits = limits_with_planes(occluders, bias, precision, has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
-                                                                 load_lanes((has_planes ? slope_eta : d) + place), own[row].xi, own[row].eta, own[row].d);
+                            own[top + row].limits = limits_with_planes(occluders, bias, precision, has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
+                                                                 load_lanes((has_planes ? slope_eta : d) + place), own[top + row].xi, own[top + row].eta, own[top + row].d);
                         }
                         has_limits = true;
                     }
@@ -282,7 +303,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                         whole = small || (p->flags & SOLID) || ((p->flags & FULL) && may_be_one(search, p->reach, p->least));
                         if (whole) {
                             rectangle = rectangle_of(*p, at.x, at.y, cell);
-                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(p, &rectangle, &own[row].limits);
+                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(p, &rectangle, &own[top + row].limits);
                         }
                     }
                     if (!whole) {
@@ -296,14 +317,14 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     count += together;
                     for (int row = 0; row < together; ++row) {
                         if (over[row]) continue;
-                        hide(bits[row], &rectangle, at.z == 0, scale, &own[row]);
-                        if (at.z < 3 || !all_hidden(bits[row], own[row].d)) continue;
+                        hide(bits[row], &rectangle, at.z == 0, scale, &own[top + row]);
+                        if (at.z < 3 || !all_hidden(bits[row], own[top + row].d)) continue;
                         over[row] = true;
                         --rows_left;
                     }
                 }
                 for (int row = 0; row < together && has_limits; ++row)
-                    if (!over[row] && all_hidden(bits[row], own[row].d)) {
+                    if (!over[row] && all_hidden(bits[row], own[top + row].d)) {
                         over[row] = true;
                         --rows_left;
                     }

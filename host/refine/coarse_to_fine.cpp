@@ -297,7 +297,7 @@ private:
         const int xs[3] = {block.x0, block.middle_x(), block.x1}, ys[3] = {block.y0, block.middle_y(), block.y1};
         for (int j = 0; j < 2; ++j)
             for (int i = 0; i < 2; ++i)
-                for (std::size_t k = 0; k < channels_; ++k) fill({xs[i], ys[j], xs[i + 1], ys[j + 1]}, j == 0, k);
+                for (std::size_t k = 0; k < channels_; ++k) fill({xs[i], ys[j], xs[i + 1], ys[j + 1]}, ys[j] == block.y0, k);
     }
 
     void fill(const Block& part, bool first_row, std::size_t channel)

@@ -51,22 +51,28 @@ std::vector<cl_uint> light_rows(LightShape shape)
     return rows;
 }
 
-// The texels of all maps. A larger map becomes surfaces with what they cover of each texel: the mean of two surfaces is none of them.
+bool is_reduced(const UnionMaps& maps) { return count_of(maps.from) > count_of(maps.size); }
+
+// The texels of all maps. A larger map becomes two: the nearest surfaces of its texels, and those behind them.
 void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
     const MapSize from = maps.from, size = maps.size;
-    const std::size_t count = count_of(size);
-    const bool larger = count_of(from) > count;
-    prepared.texels = work.buffer<cl_float2>(maps.depth.size() * count, "occluder texels");
-    if (larger) prepared.parts = work.buffer<cl_float4>(maps.depth.size() * count, "covered parts of texels");
+    const std::size_t count = count_of(size), given = maps.depth.size();
+    const bool reduced = is_reduced(maps);
+    prepared.maps = static_cast<int>(reduced ? 2 * given : given);
+    prepared.texels = work.buffer<cl_float2>(static_cast<std::size_t>(prepared.maps) * count, "occluder texels");
+    if (reduced) prepared.parts = work.buffer<cl_float4>(static_cast<std::size_t>(prepared.maps) * count, "covered parts of texels");
     const cl_float2 gap = gap_of(view);
-    for (std::size_t i = 0; i < maps.depth.size(); ++i) {
-        const auto begin = static_cast<cl_int>(i * count);
-        if (larger)
-            work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count * 24, dimensions(from), maps.depth[i], dimensions(size), begin,
-                        std::min(gap.s[0], gap.s[1]), prepared.texels, prepared.parts);
-        else
+    for (std::size_t i = 0; i < given; ++i) {
+        const auto begin = static_cast<cl_int>(i * count), second = static_cast<cl_int>((given + i) * count);
+        if (!reduced) {
             work.launch(program, "texels_of_map", grid_of(size), {16, 8}, count * 12, dimensions(size), begin, maps.depth[i], prepared.texels);
+            continue;
+        }
+        const auto disparities = work.buffer<float>(count_of(from), "disparities");
+        work.launch(program, "disparities_of_map", {count_of(from), 1}, {256, 1}, count_of(from) * 8, static_cast<cl_int>(count_of(from)), maps.depth[i], disparities);
+        work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count * 48, dimensions(from), disparities, dimensions(size), begin, second,
+                    std::min(gap.s[0], gap.s[1]), prepared.texels, prepared.parts);
     }
 }
 
@@ -77,13 +83,15 @@ constexpr std::array<std::size_t, 2> joining{8, 8};
 void add_patches(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
     const std::vector<MapSize> sizes = level_sizes(maps.size);
-    const std::size_t texels = count_of(maps.size), count = maps.depth.size(), last = count_of(sizes.back());
+    const std::size_t texels = count_of(maps.size), count = static_cast<std::size_t>(prepared.maps), last = count_of(sizes.back());
     for (std::size_t level = 1; level < sizes.size(); ++level) prepared.above += count_of(sizes[level]);
     prepared.edges = work.buffer<cl_float4>(count * texels, "occluder texels' edges");
     prepared.texel_reach = work.buffer<float>(count * texels, "occluder texels' reach");
     prepared.reach = work.buffer<float>(count * prepared.above, "micro-patches' reach");
     prepared.patches = work.buffer<MicroPatch>(count * prepared.above, "micro-patches");
-    const auto other = work.lend(maps.other, "maps of the other sides");
+    std::vector<cl_int> others(maps.other.begin(), maps.other.end());
+    others.resize(count, -1); // a surface behind another one: its other side is not told
+    const auto other = work.lend(std::span<const cl_int>(others), "maps of the other sides");
     const auto nearest = work.buffer<float>(count * last, "greatest disparities");
 
     const cl_int2 size = dimensions(maps.size);
@@ -110,7 +118,6 @@ PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const Occ
 {
     const opencl::Specialisation program = union_program(work.context().quirks().lanes);
     PreparedUnion prepared;
-    prepared.maps = static_cast<int>(maps.depth.size());
     const std::vector<cl_uint> rows = light_rows(maps.shape);
     prepared.light_rows = work.upload(std::span<const cl_uint>(rows), "samples of the light");
     for (const cl_uint row : rows) prepared.light_samples += std::popcount(row);

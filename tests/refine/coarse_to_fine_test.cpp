@@ -76,6 +76,27 @@ TEST(CoarseToFine, WhatWasShadedStaysAsItWas)
     EXPECT_EQ(result.visibility, values);
 }
 
+// What is shaded is never written again, at any size: the last blocks of an image may be one pixel high or wide.
+TEST(CoarseToFine, WhatWasShadedStaysBesideWhatWasNot)
+{
+    for (const auto& [width, height] : {std::pair{256, 200}, {200, 256}, {97, 98}, {64, 39}, {41, 63}, {512, 512}}) {
+        const World world(width, height);
+        const auto value = [width = width, height = height](int x, int y) { return 3 * x < 2 * width && 3 * y < 2 * height ? 0.5f : static_cast<float>(0.5 + 0.01 * std::sin(0.9 * x) * std::sin(1.1 * y)); };
+        std::set<std::uint32_t> shaded;
+        const CoarseToFine result = shade_coarse_to_fine(world.image(), 1, {.tolerance = 0.02}, world.field(), [&](std::span<const std::uint32_t> pixels) {
+            std::vector<float> values;
+            for (const std::uint32_t pixel : pixels) {
+                shaded.insert(pixel);
+                values.push_back(value(static_cast<int>(pixel) % width, static_cast<int>(pixel) / width));
+            }
+            return values;
+        });
+        ASSERT_GT(shaded.size(), 0u);
+        for (const std::uint32_t pixel : shaded)
+            ASSERT_EQ(result.visibility[pixel], value(static_cast<int>(pixel) % width, static_cast<int>(pixel) / width)) << width << ' ' << height << ' ' << pixel % static_cast<unsigned>(width) << ' ' << pixel / static_cast<unsigned>(width);
+    }
+}
+
 TEST(CoarseToFine, EverySizeAndNoReceivers)
 {
     for (const auto& [width, height] : {std::pair{1, 1}, {1, 40}, {40, 1}, {2, 2}, {7, 61}, {17, 16}, {93, 3}}) {
