@@ -46,7 +46,7 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
 }
 
 // Texels of all maps of a union together, as long as nobody asks for a resolution: larger maps become surfaces with what they cover of larger texels, which
-// loses little, and patches take 54 bytes a texel.
+// loses little, and a map takes 51 bytes a texel, one that was reduced 133.
 constexpr double most_union_texels = 1 << 21;
 
 // The size that a map is shaded with.

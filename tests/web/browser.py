@@ -19,7 +19,7 @@ from selenium.webdriver.chrome.service import Service
 
 OUT = pathlib.Path(os.environ.get("PENUMBRA_OUT", "."))
 EXAMPLES = pathlib.Path(os.environ["PENUMBRA_EXAMPLES"])
-WAIT_S = 30  # for one mask, on a machine that does other things too
+WAIT_S = 120  # for one mask: a trace of 1280 x 720 takes half a minute on two cores that do other things too
 
 
 def png_bytes(width, height, colour):
