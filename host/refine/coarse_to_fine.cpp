@@ -23,7 +23,6 @@ constexpr float middle_per_tolerance = 1.f / 6;
 constexpr double passed_per_tolerance = 10. / 3, most_passed = 0.25;
 constexpr std::size_t many_blocks = 8, many_kept = 128; // that a thread takes at once
 constexpr std::size_t few_groups = 4; // threads take longer to start than these
-constexpr int rows_together = 64;
 
 // A block of receivers, its last column and row included: neighbours share theirs.
 struct Block {
@@ -46,10 +45,11 @@ public:
         const std::size_t count = static_cast<std::size_t>(receivers.width) * static_cast<std::size_t>(receivers.height);
         result_.visibility.assign(count * channels_, 1.f);
         known_.assign(count, 0);
-        nearness_.resize(count);
-        parallel_for((receivers.height + rows_together - 1) / rows_together, [&](int group) {
-            for (int y = group * rows_together; y < std::min(receivers.height, (group + 1) * rows_together); ++y) measure_row(y);
-        });
+        if (!receivers.points.empty()) {
+            lifted_.resize(count);
+            for (std::size_t i = 0; i < count; ++i) lifted_[i] = receivers.points[i].z;
+        }
+        depth_ = receivers.points.empty() ? receivers.depth : std::span<const float>(lifted_);
         pixel_ = 2 * std::max(receivers.camera.half_extent.x / receivers.width, receivers.camera.half_extent.y / receivers.height);
     }
 
@@ -74,28 +74,17 @@ public:
             const std::size_t begin = static_cast<std::size_t>(group) * many_kept;
             for (std::size_t i = begin; i < std::min(kept.size(), begin + many_kept); ++i) interpolate(kept[i]);
         });
-        std::uint64_t count = 0;
-        for (const float nearness : nearness_) count += nearness != 0;
+        std::uint32_t count = 0;
+        for (const float z : depth_) count += there(z);
         result_.receivers = count;
         return std::move(result_);
     }
 
 private:
     std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * static_cast<std::size_t>(receivers_.width) + static_cast<std::size_t>(x); }
-    double depth_at(std::size_t pixel) const { return receivers_.points.empty() ? receivers_.depth[pixel] : receivers_.points[pixel].z; }
-
-    // What is linear over a plane's image: 1 / z, of an orthographic camera z. 0: no receiver.
-    void measure_row(int y)
-    {
-        constexpr float most = std::numeric_limits<float>::max();
-        const bool orthographic = receivers_.camera.orthographic, given = receivers_.points.empty();
-        const std::size_t begin = at(0, y), end = begin + static_cast<std::size_t>(receivers_.width);
-        for (std::size_t i = begin; i < end; ++i) nearness_[i] = given ? receivers_.depth[i] : receivers_.points[i].z;
-        for (std::size_t i = begin; i < end; ++i) {
-            const float z = nearness_[i], there = z > 0 && z <= most ? z : 0, up = 1 / (there > 0 ? there : 1);
-            nearness_[i] = orthographic || there == 0 ? there : up;
-        }
-    }
+    static bool there(float z) { return z > 0 && z <= std::numeric_limits<float>::max(); }
+    // What is linear over a plane's image: 1 / z, of an orthographic camera z.
+    float nearness(std::size_t pixel) const { return receivers_.camera.orthographic ? depth_[pixel] : 1 / depth_[pixel]; }
 
     std::vector<Block> roots() const
     {
@@ -146,24 +135,29 @@ private:
     {
         for (int y = block.y0; y <= block.y1; ++y)
             for (int x = block.x0; x <= block.x1; ++x)
-                if (nearness_[at(x, y)] != 0) return false;
+                if (there(depth_[at(x, y)])) return false;
         return true;
     }
 
     // Whether the receivers are of one surface without creases.
     bool smooth(const Block& block) const
     {
-        const float a = nearness_[at(block.x0, block.y0)], b = nearness_[at(block.x1, block.y0)], c = nearness_[at(block.x0, block.y1)], d = nearness_[at(block.x1, block.y1)];
-        const float least = std::min(std::min(a, b), std::min(c, d));
-        if (least == 0) return false;
+        const std::size_t corners[4] = {at(block.x0, block.y0), at(block.x1, block.y0), at(block.x0, block.y1), at(block.x1, block.y1)};
+        if (!std::all_of(std::begin(corners), std::end(corners), [&](std::size_t corner) { return there(depth_[corner]); })) return false;
+        const float a = nearness(corners[0]), b = nearness(corners[1]), c = nearness(corners[2]), d = nearness(corners[3]);
         // A step along the view of so many pixels' footprints: z^2 dq is the step, z pixel_ the footprint; orthographic, dz and pixel_.
-        const float allowed = static_cast<float>(flat * pixel_) * (receivers_.camera.orthographic ? 1 : least);
+        const bool orthographic = receivers_.camera.orthographic;
+        const float allowed = static_cast<float>(flat * pixel_) * (orthographic ? 1 : std::min(std::min(a, b), std::min(c, d)));
         const float per_x = block.x1 > block.x0 ? 1.f / static_cast<float>(block.x1 - block.x0) : 0, per_y = block.y1 > block.y0 ? 1.f / static_cast<float>(block.y1 - block.y0) : 0;
+        constexpr float most = std::numeric_limits<float>::max();
         for (int y = block.y0; y <= block.y1; ++y) {
             const float t = static_cast<float>(y - block.y0) * per_y, left = a + (c - a) * t, step = (b + (d - b) * t - left) * per_x;
-            const float* row = nearness_.data() + at(block.x0, y);
+            const float* row = depth_.data() + at(block.x0, y);
             int off = 0; // counted: compilers do that in vectors
-            for (int x = 0; x <= block.x1 - block.x0; ++x) off += !(std::abs(row[x] - (left + step * static_cast<float>(x))) <= allowed) || row[x] == 0;
+            if (orthographic)
+                for (int x = 0; x <= block.x1 - block.x0; ++x) off += !(std::abs(row[x] - (left + step * static_cast<float>(x))) <= allowed) || !(row[x] > 0);
+            else // |1 / z - q| <= allowed, times z
+                for (int x = 0; x <= block.x1 - block.x0; ++x) off += !(std::abs(1 - (left + step * static_cast<float>(x)) * row[x]) <= allowed * row[x]) || !(row[x] <= most);
             if (off > 0) return false;
         }
         return receivers_.normals.empty() || turns_little(block);
@@ -195,7 +189,7 @@ private:
     Vec3 world(int x, int y) const
     {
         const std::size_t pixel = at(x, y);
-        if (receivers_.points.empty()) return world_point(receivers_.camera, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth_at(pixel));
+        if (receivers_.points.empty()) return world_point(receivers_.camera, receivers_.width, receivers_.height, x + 0.5, y + 0.5, depth_[pixel]);
         const DepthVector& p = receivers_.points[pixel];
         return world_from_camera(receivers_.camera, Vec3(p.x, p.y, p.z));
     }
@@ -220,7 +214,7 @@ private:
     ReceiverPatch patch_of(const Block& block, const Corners& corners) const
     {
         ReceiverPatch patch{.corners = {field_.point(corners[0]), field_.point(corners[1]), field_.point(corners[2]), field_.point(corners[3])}};
-        const float least = nearness_[at(block.x0, block.y0)];
+        const float least = nearness(at(block.x0, block.y0));
         patch.off = flat * pixel_ * (receivers_.camera.orthographic ? 1 : 1 / static_cast<double>(least));
         const double part_x = static_cast<double>(block.x1 - block.middle_x()) / (block.x1 - block.x0), part_y = static_cast<double>(block.y1 - block.middle_y()) / (block.y1 - block.y0);
         if (block.x1 > block.x0) {
@@ -240,7 +234,7 @@ private:
         std::vector<std::uint32_t> pixels;
         const auto add = [&](int x, int y) {
             const std::size_t pixel = at(x, y);
-            if (known_[pixel] || nearness_[pixel] == 0) return;
+            if (known_[pixel] || !there(depth_[pixel])) return;
             known_[pixel] = 1;
             pixels.push_back(static_cast<std::uint32_t>(pixel));
         };
@@ -330,7 +324,8 @@ private:
     const OccluderField& field_;
     const ShadePixels& shade_;
     double pixel_ = 0;            // a pixel's footprint over depth; orthographic: itself
-    std::vector<float> nearness_; // [height][width]
+    std::vector<float> lifted_;   // depths of points, where there are some
+    std::span<const float> depth_; // [height][width], planar
     std::vector<std::uint8_t> known_;
     CoarseToFine result_;
 };
