@@ -48,12 +48,13 @@ OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::s
 void OccluderField::add_row(std::span<const DepthMap* const> maps, int row, int joined, std::vector<float>& near, std::vector<float>& far, Level& level) const
 {
     constexpr float most = std::numeric_limits<float>::max();
-    const int width = maps.front()->width, height = maps.front()->height;
+    const auto width = static_cast<std::size_t>(maps.front()->width);
+    const int height = maps.front()->height;
     std::fill(near.begin(), near.end(), most);
     std::fill(far.begin(), far.end(), 0.f);
     for (const DepthMap* map : maps)
         for (int y = row * joined; y < std::min(height, (row + 1) * joined); ++y) {
-            const float* z = map->depth.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+            const float* z = map->depth.data() + static_cast<std::size_t>(y) * width;
             for (std::size_t x = 0; x < near.size(); ++x) {
                 const bool there = z[x] > 0 && z[x] <= most;
                 const float low = there ? z[x] : most, high = there ? z[x] : 0.f;
@@ -63,8 +64,12 @@ void OccluderField::add_row(std::span<const DepthMap* const> maps, int row, int 
         }
     const std::size_t begin = static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width);
     for (int cell = 0; cell < level.width; ++cell) {
-        const auto first = static_cast<std::ptrdiff_t>(cell) * joined, last = std::min<std::ptrdiff_t>(first + joined, width);
-        const float least = *std::min_element(near.begin() + first, near.begin() + last), greatest = *std::max_element(far.begin() + first, far.begin() + last);
+        const std::size_t first = static_cast<std::size_t>(cell) * static_cast<std::size_t>(joined), last = std::min(first + static_cast<std::size_t>(joined), near.size());
+        float least = most, greatest = 0;
+        for (std::size_t x = first; x < last; ++x) {
+            least = near[x] < least ? near[x] : least;
+            greatest = far[x] > greatest ? far[x] : greatest;
+        }
         if (greatest == 0) continue;
         level.low[begin + static_cast<std::size_t>(cell)] = static_cast<float>(height_of(greatest));
         level.high[begin + static_cast<std::size_t>(cell)] = static_cast<float>(height_of(least));

@@ -40,15 +40,21 @@ std::pair<double, double> sample_place(unsigned i, unsigned k)
 }
 
 // The samples that shine: all of a rectangle, of a disc those inside.
-std::vector<cl_uint> light_rows(LightShape shape)
+using LightRows = std::array<cl_uint, LIGHT_SIDE>;
+LightRows rows_of(LightShape shape)
 {
-    std::vector<cl_uint> rows(LIGHT_SIDE, 0);
+    LightRows rows{};
     for (unsigned k = 0; k < LIGHT_SIDE; ++k)
         for (unsigned i = 0; i < LIGHT_SIDE; ++i) {
             const auto [u, v] = sample_place(i, k);
             if (shape == LightShape::rectangle || (2 * u - 1) * (2 * u - 1) + (2 * v - 1) * (2 * v - 1) <= 1) rows[k] |= 1u << i;
         }
     return rows;
+}
+const LightRows& light_rows(LightShape shape)
+{
+    static const LightRows rectangle = rows_of(LightShape::rectangle), disc = rows_of(LightShape::disc);
+    return shape == LightShape::rectangle ? rectangle : disc;
 }
 
 bool is_reduced(const UnionMaps& maps) { return count_of(maps.from) > count_of(maps.size); }
@@ -118,8 +124,8 @@ PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const Occ
 {
     const opencl::Specialisation program = union_program(work.context().quirks().lanes);
     PreparedUnion prepared;
-    const std::vector<cl_uint> rows = light_rows(maps.shape);
-    prepared.light_rows = work.upload(std::span<const cl_uint>(rows), "samples of the light");
+    const LightRows& rows = light_rows(maps.shape);
+    prepared.light_rows = work.lend(std::span<const cl_uint>(rows), "samples of the light");
     for (const cl_uint row : rows) prepared.light_samples += std::popcount(row);
     add_texels(work, maps, view, program, prepared);
     add_patches(work, maps, view, program, prepared);
