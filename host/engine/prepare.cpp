@@ -188,7 +188,7 @@ void prepare_technique(Prepared::State& state, const Casting& casting)
     finish_prepare(work, state);
 }
 
-constexpr int field_side = 128; // texels of the view that is rendered for techniques which need none
+constexpr int field_side = 256; // texels of the view that is rendered for techniques which need none
 
 // What casts, from the maps that the technique has or from the light's view of the objects. Where the light can have no such view, all receivers are
 // shaded.
@@ -201,7 +201,8 @@ void add_field(Prepared::State& state, const Casting& casting, const Geometry& g
     const LightFrame frame = light_frame(state.light);
     if (!maps.empty()) {
         const Stopwatch watch;
-        state.field = std::make_shared<const OccluderField>(frame, casting.depth.camera, maps);
+        state.proves_lit = needs_of(state.technique).maps_tell_all;
+        state.field = std::make_shared<const OccluderField>(frame, casting.depth.camera, maps, state.proves_lit ? 0 : 1);
         add_stages(state.stages, {{"prepare", watch.ms(), 0, 0}});
         state.prepare_ms = work_ms(state.stages);
         return;
@@ -212,7 +213,7 @@ void add_field(Prepared::State& state, const Casting& casting, const Geometry& g
         const Camera camera = occluder_camera(state.light, LightCamera{}, geometry.objects(), field_side, field_side, left_out);
         const Views views = views_of(geometry, &Object::casts, camera, field_side, field_side, true, true, state.device);
         const std::array<const DepthMap*, 2> both{&views.front, &views.back};
-        state.field = std::make_shared<const OccluderField>(frame, camera, both);
+        state.field = std::make_shared<const OccluderField>(frame, camera, both, 1);
     } catch (const Error& error) {
         if (error.code() != ErrorCode::invalid_input) throw;
     }
@@ -368,6 +369,7 @@ Prepared Engine::with_emission(const Prepared& prepared, const Image& emission) 
     state->covered = before.covered;
     state->grounds = before.grounds;
     state->field = before.field;
+    state->proves_lit = before.proves_lit;
     state->warnings = before.warnings;
     opencl::Work work(state->device);
     state->data = under_other_emission(work, before.data, state->light);

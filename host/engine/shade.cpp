@@ -321,7 +321,7 @@ Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade
     };
     work.stage("choose receivers");
     const int channels = has_emission(state.light) ? 3 : state.channels;
-    CoarseToFine result = shade_coarse_to_fine(image, channels, {.tolerance = needs.tolerance, .proves_lit = needs.maps_tell_all}, *state.field, shade_list);
+    CoarseToFine result = shade_coarse_to_fine(image, channels, {.tolerance = needs.tolerance, .proves_lit = state.proves_lit}, *state.field, shade_list);
     report.receivers = result.receivers;
     report.receivers_shaded = result.shaded;
     if (shaded.counts) *shaded.counts = counted;

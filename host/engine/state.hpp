@@ -36,6 +36,7 @@ struct Prepared::State {
     std::optional<Geometry> receiver_geometry;     // with objects that receive, where the technique wants the light's view of them
     PreparedTechnique data;
     std::shared_ptr<const OccluderField> field;    // with a tolerance: what casts, so that fewer receivers are shaded; null: all are
+    bool proves_lit = false;                       // the field is of all that darkens but the receivers' own horizons
 
     std::vector<Stage> stages;
     double prepare_ms = 0;

@@ -27,7 +27,7 @@ struct OccluderField::Query {
     double plane(double xi, double eta) const { return level + slope_xi * xi + slope_eta * eta; }
 };
 
-OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps) : light_(light), view_(view)
+OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps, double spare) : light_(light), view_(view), spare_(spare)
 {
     const int width = maps.front()->width, height = maps.front()->height;
     const int joined = (std::max(width, height) + finest - 1) / finest;
@@ -179,7 +179,7 @@ bool OccluderField::cell_resolved(Query& query, std::size_t level, int x, int y)
     const auto beside = [&](double x_spare, double y_spare) {
         return left - reach_x - x_spare > query.xi_high || right + reach_x + x_spare < query.xi_low || bottom - reach_y - y_spare > query.eta_high || top + reach_y + y_spare < query.eta_low;
     };
-    if (beside(side_x, side_y)) return true;
+    if (beside((1 + spare_) * side_x, (1 + spare_) * side_y)) return true;
 
     const double middle = query.plane(0.5 * (left + right), 0.5 * (top + bottom));
     const double half = 0.5 * (std::abs(query.slope_xi) * (right - left) + std::abs(query.slope_eta) * (top - bottom));
@@ -190,7 +190,7 @@ bool OccluderField::cell_resolved(Query& query, std::size_t level, int x, int y)
         query.casts = true;
         return true;
     }
-    if (level == 0) return beside(0, 0);
+    if (level == 0) return beside(spare_ * side_x, spare_ * side_y);
     const Level& below = levels_[level - 1];
     for (int j = 2 * y; j < std::min(2 * y + 2, below.height); ++j)
         for (int i = 2 * x; i < std::min(2 * x + 2, below.width); ++i)

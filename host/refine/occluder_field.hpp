@@ -35,7 +35,8 @@ enum class Passing : std::uint8_t {
 class OccluderField {
 public:
     // maps: planar depth in `view`, the light's own, all of one size. A texel is full from its least depth to its greatest.
-    OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps);
+    // spare: how many cells what casts may reach beyond those that show it: 1 where the maps are samples of it, 0 where their texels are what casts.
+    OccluderField(const LightFrame& light, const Camera& view, std::span<const DepthMap* const> maps, double spare = 0);
 
     // `little`: the penumbra of everything that casts on the patch is at least 1 / `share` steps wide: from one shaded receiver to the next the
     // back-projection of what casts moves by at most that share of the light, so that nothing passes unseen between the two.
@@ -62,7 +63,7 @@ private:
 
     LightFrame light_;
     Camera view_;
-    double precision_ = 0;
+    double spare_ = 0, precision_ = 0;
     std::vector<Level> levels_; // the finest first, the last of one cell
 };
 

@@ -77,7 +77,7 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
                 prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, work.stop());
 }
 
-Needs needs(const ShadowMap&) { return {.front = true}; }
+Needs needs(const ShadowMap&) { return {.front = true, .every_receiver = true}; } // hard, or as wide as its filter
 
 PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const ShadowMap& settings, Findings& findings)
 {

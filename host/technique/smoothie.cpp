@@ -311,7 +311,7 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
 }
 
 // Fins reach beyond what casts, and t is in parts of the view.
-Needs needs(const Smoothie&) { return {.front = true, .whole_view = true}; }
+Needs needs(const Smoothie&) { return {.front = true, .whole_view = true, .every_receiver = true}; } // as wide as its fins
 
 PreparedSmoothie prepare(opencl::Work& work, const Casting& casting, const Smoothie& settings, Findings& findings)
 {

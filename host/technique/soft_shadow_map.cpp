@@ -154,7 +154,7 @@ TechniqueRow row(const SoftShadowMap&)
                  integer_key<S>("resolution", &S::resolution, {0, 65536}, "texels",
                                 "longer side of the occluder map that is shaded with, made from the one given; 0: as it is, of the union up to 2^21 texels of all maps together"),
                  choice_key<S>("reduction", &S::reduction, reduction_names,
-                               "how a larger map becomes `resolution`, for sum: by covered area, or by the texel at the centre; union takes the texel at the centre"),
+                               "how a larger map becomes `resolution`, for sum: by covered area, or by the texel at the centre; union keeps the two nearest surfaces of each texel"),
                  choice_key<S>("accumulator", &S::accumulator, accumulator_names,
                                "how shares are summed, for sum; binary16 is the 2006 hardware's blending, for study"),
                  real_key<S>("bias", &S::bias, {0, 16}, "derived bounds",
@@ -249,7 +249,7 @@ Needs needs(const SoftShadowMap& settings)
             .back = settings.sides != Sides::front,
             .layers = settings.visibility == PatchVisibility::united && settings.sides != Sides::back ? settings.layers : 0,
             .receivers_from_light = settings.project,
-            .maps_tell_all = true};
+            .maps_tell_all = settings.visibility == PatchVisibility::united}; // a sum's larger texels reach beyond what the maps show
 }
 
 PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings)

@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+
+#include <penumbra/error.hpp>
 
 #include "technique/tiling.hpp"
 
 namespace penumbra {
 namespace {
 
-// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance. Measured: errors of patches mostly cancel.
+// How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance. Measured
+// (docs/tolerance.md): without such patches the largest differences are the same.
 constexpr double coarse_per_tolerance = 1;
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
@@ -57,17 +61,18 @@ const LightRows& light_rows(LightShape shape)
     return shape == LightShape::rectangle ? rectangle : disc;
 }
 
-bool is_reduced(const UnionMaps& maps) { return count_of(maps.from) > count_of(maps.size); }
-
 // The texels of all maps. A larger map becomes two: the nearest surfaces of its texels, and those behind them.
 void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
     const MapSize from = maps.from, size = maps.size;
     const std::size_t count = count_of(size), given = maps.depth.size();
-    const bool reduced = is_reduced(maps);
-    prepared.maps = static_cast<int>(reduced ? 2 * given : given);
-    prepared.texels = work.buffer<cl_float2>(static_cast<std::size_t>(prepared.maps) * count, "occluder texels");
-    if (reduced) prepared.parts = work.buffer<cl_float4>(static_cast<std::size_t>(prepared.maps) * count, "covered parts of texels");
+    const bool reduced = count_of(from) > count;
+    const std::size_t all = (reduced ? 2 : 1) * given;
+    if (std::max(all * count, count_of(from)) > std::numeric_limits<cl_int>::max())
+        throw Error::at(ErrorCode::too_large, "technique.resolution", "comes to " + std::to_string(all * count) + " texels of all maps", "expected less than 2^31, from maps of less than that");
+    prepared.maps = static_cast<int>(all);
+    prepared.texels = work.buffer<cl_float2>(all * count, "occluder texels");
+    if (reduced) prepared.parts = work.buffer<cl_float4>(all * count, "covered parts of texels");
     const cl_float2 gap = gap_of(view);
     for (std::size_t i = 0; i < given; ++i) {
         const auto begin = static_cast<cl_int>(i * count), second = static_cast<cl_int>((given + i) * count);

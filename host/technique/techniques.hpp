@@ -60,7 +60,7 @@ inline Needs needs_of(const Technique& technique)
     return std::visit(
         [](const auto& settings) {
             Needs wanted = needs(settings);
-            wanted.tolerance = settings.tolerance;
+            wanted.tolerance = wanted.every_receiver ? 0 : settings.tolerance;
             return wanted;
         },
         technique);

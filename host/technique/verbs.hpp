@@ -60,6 +60,8 @@ struct Needs {
     bool receivers_from_light = false;
     // What its maps show between a receiver and the light, and the receiver's own horizon, are all that darkens it.
     bool maps_tell_all = false;
+    // Its penumbrae are not the light's, so that nothing tells receivers from their neighbours.
+    bool every_receiver = false;
     // What computing fewer receivers may add to a pixel's error; 0: each is shaded.
     double tolerance = 0;
 };

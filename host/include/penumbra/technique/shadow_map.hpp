@@ -13,7 +13,7 @@ struct ShadowMap {
     ShadowFilter filter = ShadowFilter::hard;
     int taps = 3;      // percentage_closer: taps x taps texels (Reeves et al. 1987)
     double bias = 1.0; // in units of the bound derived from each texel's slope and the depth's precision
-    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
+    double tolerance = 0; // not used: its penumbrae are not the light's, and every receiver is computed (docs/tolerance.md)
 };
 
 } // namespace penumbra

@@ -21,7 +21,7 @@ struct Smoothie {
     Falloff falloff = Falloff::sinusoidal; // 3.1
     bool two_sided = true;                 // beyond the paper: an inner fin too, half lit at the silhouette
     double bias = 1.0;                     // as of ShadowMap
-    double tolerance = 0; // what computing fewer receivers may add to a pixel's error (docs/tolerance.md); 0: every receiver is computed
+    double tolerance = 0; // not used: its penumbrae are not the light's, and every receiver is computed (docs/tolerance.md)
 };
 
 } // namespace penumbra
