@@ -183,15 +183,17 @@ std::int64_t peak_bytes()
     return std::int64_t{used.ru_maxrss} << 10;
 }
 
-// Without a sanitizer, which has limits of its own and maps terabytes: nothing larger than the growth allowed can be had.
+// Without a sanitizer, which has limits of its own and maps terabytes: nothing larger than the growth allowed can be had. Of what can be
+// written, as glibc reserves 64 MiB of addresses, and 128 for a moment, for each thread that allocates: a library's threads would use up a
+// limit of addresses before an input does.
 void limit_memory()
 {
 #ifndef __SANITIZE_ADDRESS__
-    std::int64_t pages = 0;
-    std::ifstream("/proc/self/statm") >> pages;
-    const auto limit = static_cast<rlim_t>(pages * ::sysconf(_SC_PAGESIZE) + most_growth_bytes);
+    std::int64_t size = 0, resident = 0, shared = 0, text = 0, libraries = 0, data = 0; // proc(5), statm
+    std::ifstream("/proc/self/statm") >> size >> resident >> shared >> text >> libraries >> data;
+    const auto limit = static_cast<rlim_t>(data * ::sysconf(_SC_PAGESIZE) + most_growth_bytes);
     const rlimit both{limit, limit};
-    ::setrlimit(RLIMIT_AS, &both);
+    ::setrlimit(RLIMIT_DATA, &both);
 #endif
 }
 
