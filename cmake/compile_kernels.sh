@@ -11,7 +11,8 @@ kernels=$2
 list=$3
 
 # spir64 stands for any device (generic OpenCL address spaces, no vector registers to lean on), amdgcn for a real GPU, the empty one for the
-# host, which is what PoCL compiles for. A clang without a back end leaves that one out.
+# host, which is what PoCL compiles for, with
+# the header that PoCL 3.1 is given. A clang without a back end leaves that one out.
 targets=
 for target in spir64 amdgcn-amd-amdhsa; do
     if echo 'kernel void probe(global float* a) { a[get_global_id(0)] = 0.0f; }' |
@@ -33,8 +34,8 @@ compile='
         exit 1
     fi
     for target in host $targets; do
-        if [ "$target" = host ]; then machine=; else machine="-target $target -nogpulib"; fi
-        if ! "$clang" -x cl -cl-std=CL1.2 $machine -Xclang -finclude-default-header -Wall -Wextra -Wundef -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
+        if [ "$target" = host ]; then machine="-include opencl-c-base.h -include $kernels/common/builtins_pocl_31.clh"; else machine="-target $target -nogpulib -Xclang -finclude-default-header"; fi
+        if ! "$clang" -x cl -cl-std=CL1.2 $machine -Wall -Wextra -Wundef -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
             echo "compile_kernels: failed for $target: $file $*" >&2
             exit 1
         fi

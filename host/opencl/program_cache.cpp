@@ -8,6 +8,7 @@
 #include "opencl/cache_folder.hpp"
 #include "opencl/driver_cache.hpp"
 #include "opencl/errors.hpp"
+#include "opencl/kernel_files.hpp"
 #include "opencl/program_text.hpp"
 #include "scene/stop.hpp"
 
@@ -18,6 +19,9 @@ namespace {
 // No warnings: on processors without AVX-512 clang warns of each float16 that a function takes, as its way in differs from that of other
 // programs, and PoCL prints their number on standard error. What is worth a warning stops the project's own build.
 constexpr const char* build_options = "-cl-std=CL1.2 -w";
+
+// With the built-in functions declared by us (quirks.hpp): opencl-c.h has been read, it is told.
+constexpr const char* without_header = "-cl-std=CL1.2 -w -D_OPENCL_H_";
 
 // For the test that every program anybody asks for is among those that the build compiles: a line for each goes to the file that
 // PENUMBRA_PROGRAM_LOG names. One write a line, so that many processes may share the file.
@@ -52,7 +56,9 @@ ProgramCache::ProgramCache(cl::Context context, cl::Device device, const std::st
                                     device_.getInfo<CL_DEVICE_VERSION>(), platform.getInfo<CL_PLATFORM_VERSION>()}) {
         device_id_ += part + '\n';
     }
-    driver_keeps_ = quirks_of(device_).driver_cache;
+    const Quirks quirks = quirks_of(device_);
+    driver_keeps_ = quirks.driver_cache;
+    builtins_ = quirks.builtins;
     if (!folder.empty() && make_private_folder(folder)) folder_ = folder;
 }
 
@@ -125,11 +131,21 @@ cl::Program ProgramCache::build(const std::string& name, const std::string& text
     return program;
 }
 
-cl::Program ProgramCache::build_from_source(const std::string& name, const std::string& text) const
+cl::Program ProgramCache::build_from_source(const std::string& name, const std::string& text)
 {
-    cl::Program program = translated(name, [&] { return cl::Program(context_, text); });
     if (driver_keeps_) driver_cache().require_room();
     const Deaf compiling(current_stop());
+    if (!builtins_.empty()) {
+        // Of a caller's own program, which may use what is not declared there: then the driver's header is read.
+        cl::Program program = translated(name, [&] { return cl::Program(context_, std::string(kernel_file(builtins_)).append(text)); });
+        try {
+            program.build(device_, without_header);
+            return program;
+        } catch (const cl::Error&) {
+            ++built_with_header_;
+        }
+    }
+    cl::Program program = translated(name, [&] { return cl::Program(context_, text); });
     try {
         program.build(device_, build_options);
     } catch (const cl::Error& error) {

@@ -29,12 +29,14 @@ public:
     // What this object did so far.
     int built_from_source() const { return built_from_source_; }
     int loaded_from_disk() const { return loaded_from_disk_; }
+    // Those that had to read the driver's own header although quirks.hpp has one that is shorter.
+    int built_with_header() const { return built_with_header_; }
 
 private:
     template <class MakeText>
     cl::Program find_or_build(const std::string& id, const std::string& name, MakeText&& make_text, double& compile_ms);
     cl::Program build(const std::string& name, const std::string& text);
-    cl::Program build_from_source(const std::string& name, const std::string& text) const;
+    cl::Program build_from_source(const std::string& name, const std::string& text);
     // A null program when there is no binary, or the driver does not take it.
     cl::Program load(const ProgramKey& key) const;
     void store(const ProgramKey& key, const cl::Program& program) const;
@@ -43,8 +45,9 @@ private:
     cl::Device device_;
     std::string folder_;
     bool driver_keeps_ = false; // Quirks::driver_cache
+    std::string builtins_;      // Quirks::builtins
     std::string device_id_; // name, driver and platform versions
-    std::atomic<int> built_from_source_ = 0, loaded_from_disk_ = 0;
+    std::atomic<int> built_from_source_ = 0, loaded_from_disk_ = 0, built_with_header_ = 0;
 
     std::mutex mutex_;
     std::map<std::string, std::shared_future<cl::Program>> programs_; // by id: specialisation, or text

@@ -110,7 +110,11 @@ Quirks quirks_of(const cl::Device& device)
     quirks.driver_cache = is_pocl(platform.getInfo<CL_PLATFORM_NAME>());
     quirks.host_memory = processor && quirks.driver_cache;
     quirks.keep_binaries = !quirks.driver_cache;
-    quirks.system_linker = quirks.driver_cache && platform.getInfo<CL_PLATFORM_VERSION>().find("+debian") != std::string::npos;
+    // By Clang 15, whose header it declares the same functions as.
+    const std::string version = platform.getInfo<CL_PLATFORM_VERSION>();
+    if (quirks.driver_cache && version.find("PoCL 3.1") != std::string::npos && version.find("LLVM 15") != std::string::npos)
+        quirks.builtins = "common/builtins_pocl_31.clh";
+    quirks.system_linker = quirks.driver_cache && version.find("+debian") != std::string::npos;
     return quirks;
 }
 

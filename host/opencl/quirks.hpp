@@ -26,6 +26,9 @@ struct Quirks {
     bool keep_binaries = true;
     // PoCL: it keeps compiled kernels in a folder (driver_cache.hpp) that must be sound and have room, or it ends the process.
     bool driver_cache = false;
+    // A kernel file that declares the built-in functions in place of the driver's own header, which it takes longer to read than it does to
+    // compile most programs; empty: none.
+    std::string builtins;
     // Debian's PoCL: it links every kernel by the system's `ld`, or ends the process.
     bool system_linker = false;
 };

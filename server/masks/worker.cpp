@@ -202,7 +202,7 @@ private:
 
     const Options& options_;
     const Engine& engine_;
-    const std::string temporary_; // folder
+    const std::string temporary_; // folder; empty: none
     // A driver that compiles would go on for seconds. What it makes lies in this worker's own folder, and goes with it.
     Watch watch_{[] { _exit(ended_at_deadline); }};
     SceneStore scenes_;
@@ -274,7 +274,8 @@ int work(const Options& options, Kernels kernels, const std::string& temporary, 
     }
     if (!channel.send(text_of(greeting)) || !greeting.problem.empty()) return 1;
 
-    Worker worker(options, *engine, temporary);
+    // The builder of kernels takes no requests: it needs no formats.
+    Worker worker(options, *engine, kernels == Kernels::own ? temporary : std::string());
     Outbox outbox;
     std::optional<Retention> retention; // from the first call on, which warms it
     for (Message message; channel.receive(message, Channel::Clock::time_point::max()) == Channel::Got::message;) {
