@@ -9,8 +9,6 @@
 namespace penumbra::scene_file {
 namespace {
 
-constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
-
 Key center()
 {
     return {.name = "center", .type = Numbers{3}, .meaning = "its middle", .unit = "length", .required = true, .example = "[0, 6, 0]"};

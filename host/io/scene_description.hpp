@@ -35,6 +35,8 @@ struct Boolean {};
 struct Text {                      // not empty, no control characters
     std::string_view pattern = {}; // ECMA 262; empty: any
 };
+// A list's upper end that is none.
+constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
 struct File {}; // the name of a file, or of a part of a request
 struct Files {  // a list of them
     std::size_t low, high;

@@ -10,7 +10,6 @@
 namespace penumbra::scene_file {
 namespace {
 
-constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
 constexpr std::int64_t max_resolution = 65536;
 
 Key tangents(std::string_view otherwise)

@@ -12,8 +12,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
-
 // "occluder_depth" is OccluderDepth.
 std::string schema_name(std::string_view name)
 {

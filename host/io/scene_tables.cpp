@@ -13,8 +13,6 @@ using namespace scene_file;
 
 namespace {
 
-constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
-
 // The section of docs/scene_file.md that describes it.
 std::string link_to(std::string_view name)
 {
