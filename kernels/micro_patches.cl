@@ -100,6 +100,20 @@ __kernel void texels_of_map(const int2 size, const int begin, __global const flo
     texels[begin + y * size.x + x] = (float2)(d, d > 0.0f ? 1.0f : 0.0f);
 }
 
+// unshown_depth: what a map shows that another one does not.
+//
+//   depth, shown [count]  planar; `depth` and `unshown` may be one
+//   some  [1]  set to 1 where something is left
+__kernel void unshown_depth(const int count, __global const float* depth, __global const float* restrict shown, __global float* unshown, __global int* some)
+{
+    const int at = get_global_id(0);
+    if (at >= count) return;
+    const float d = depth[at];
+    const bool left = d != shown[at];
+    unshown[at] = left ? d : INFINITY;
+    if (left && disparity_of(d) > 0.0f) *some = 1;
+}
+
 // disparities_of_map: what surfaces_of_texels reads, several times each.
 __kernel void disparities_of_map(const int count, __global const float* restrict depth, __global float* restrict disparities)
 {
@@ -114,7 +128,7 @@ typedef struct {
 } Samples;
 inline float sample_at(const Samples samples, const int i, const int j) { return samples.disparities[j * samples.from.x + i]; }
 
-// One surface of a texel: the mean of its samples' disparities, what it covers as a share and as a rectangle, and its least disparity.
+// One surface of a texel: the mean of its samples' disparities, what it covers as a share and, where that is less than 1, as a rectangle; its least disparity.
 typedef struct {
     float d, share, least;
     float4 part;
@@ -163,26 +177,19 @@ inline Surface surface_below(const Samples samples, const float limit, const flo
     return surface;
 }
 
-// surfaces_of_texels: a larger map at a lower resolution: the two nearest surfaces of each texel, each with what it covers of it. Means of different surfaces
-// would be none of them, and without the second what lies beside an edge would be lost.
-//
-//   disparities [from.y][from.x]  of the larger map; 0: nothing is there
-//   gap    steps of disparity up to which samples are of one surface
-//   texels, parts [size.y][size.x]  of the nearest surfaces from `begin` on, of the second ones from `second` on: (mean disparity, covered share); the
-//                                   rectangle: left, right, top, bottom, as MicroPatch has them
-__kernel void surfaces_of_texels(const int2 from, __global const float* restrict disparities, const int2 size, const int begin, const int second, const float gap,
-                                 __global float2* restrict texels, __global float4* restrict parts)
+// The two nearest surfaces of a texel, each with what it covers of it. Means of different surfaces would be none of them, and without the second what lies
+// beside an edge would be lost.
+typedef struct {
+    Surface first, behind;
+} Surfaces;
+inline Surfaces surfaces_of(const Samples samples, const float gap)
 {
-    const int x = get_global_id(0), y = get_global_id(1);
-    if (x >= size.x || y >= size.y) return;
-    const Samples samples = {from, (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y)),
-                             (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y)), disparities};
     float nearest = 0.0f, furthest = MAXFLOAT, all = 0.0f;
     float8 near = (float8)(0.0f), far = (float8)(MAXFLOAT), sums = (float8)(0.0f);
     for (int j = samples.first.y; j < samples.last.y; ++j) {
         int i = samples.first.x;
         for (; i + 8 <= samples.last.x; i += 8) {
-            const float8 d = vload8(0, disparities + j * from.x + i);
+            const float8 d = vload8(0, samples.disparities + j * samples.from.x + i);
             near = select(near, d, d > near);
             far = select(far, d, d < far);
             sums += d;
@@ -198,22 +205,70 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
     nearest = fmax(nearest, fmax(fmax(near_half.x, near_half.y), fmax(near_half.z, near_half.w)));
     furthest = fmin(furthest, fmin(fmin(far_half.x, far_half.y), fmin(far_half.z, far_half.w)));
     all += (sum_half.x + sum_half.y) + (sum_half.z + sum_half.w);
-    const int at = y * size.x + x;
     const int2 wide = samples.last - samples.first;
     const bool plain = furthest > 0.0f && nearest - furthest <= gap;
-    Surface first = {0.0f, 0.0f, 0.0f, (float4)(0.0f)}, behind = first;
+    Surface none = {0.0f, 0.0f, 0.0f, (float4)(0.0f)};
+    Surfaces surfaces = {none, none};
     if (plain) {
-        first.d = all / (wide.x * wide.y);
-        first.share = 1.0f;
-        first.part = (float4)(0.0f, 1.0f, 0.0f, 1.0f);
+        surfaces.first.d = all / (wide.x * wide.y);
+        surfaces.first.share = 1.0f;
     } else if (nearest > 0.0f) {
-        first = surface_below(samples, INFINITY, gap);
-        behind = surface_below(samples, first.least, gap);
+        surfaces.first = surface_below(samples, INFINITY, gap);
+        surfaces.behind = surface_below(samples, surfaces.first.least, gap);
     }
-    texels[begin + at] = (float2)(first.d, first.share);
-    parts[begin + at] = first.part;
-    texels[second + at] = (float2)(behind.d, behind.share);
-    parts[second + at] = behind.part;
+    return surfaces;
+}
+
+// The rectangle is that of a texel which is covered in part: of the others, nearly all, it is neither written nor read, and its memory is never touched.
+inline void store(const Surface surface, __global float2* texel, __global float4* part)
+{
+    *texel = (float2)(surface.d, surface.share);
+    if (surface.d > 0.0f && surface.share < 1.0f) *part = surface.part;
+}
+
+// surfaces_of_texels: a larger map at a lower resolution.
+//
+//   disparities [from.y][from.x]  of the larger map; 0: nothing is there
+//   gap    steps of disparity up to which samples are of one surface
+//   texels, parts [size.y][size.x]  of the nearest surfaces from `begin` on, of the second ones from `second` on: (mean disparity, covered share); the
+//                                   rectangle where that is less than 1: left, right, top, bottom, as MicroPatch has them
+__kernel void surfaces_of_texels(const int2 from, __global const float* restrict disparities, const int2 size, const int begin, const int second, const float gap,
+                                 __global float2* restrict texels, __global float4* restrict parts)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const Samples samples = {from, (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y)),
+                             (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y)), disparities};
+    const Surfaces surfaces = surfaces_of(samples, gap);
+    const int at = y * size.x + x;
+    store(surfaces.first, texels + begin + at, parts + begin + at);
+    store(surfaces.behind, texels + second + at, parts + second + at);
+}
+
+// surfaces_of_samples: a map with samples of some of its texels; the others are what their depth says.
+//
+//   blocks [size.y][size.x]  where a texel's samples are; -1: it has none
+//   depth  [size.y][size.x]  planar
+//   disparities [blocks][side][side]  of the samples
+// The others as above.
+__kernel void surfaces_of_samples(const int2 size, const int begin, const int second, const float gap, const int side, __global const int* restrict blocks,
+                                  __global const float* restrict depth, __global const float* restrict disparities, __global float2* restrict texels, __global float4* restrict parts)
+{
+    const int x = get_global_id(0), y = get_global_id(1);
+    if (x >= size.x || y >= size.y) return;
+    const int at = y * size.x + x, block = blocks[at];
+    const float d = disparity_of(depth[at]);
+    Surface none = {0.0f, 0.0f, 0.0f, (float4)(0.0f)};
+    Surfaces surfaces = {none, none};
+    if (block >= 0) {
+        const Samples samples = {(int2)(side), (int2)(0), (int2)(side), disparities + (size_t)block * side * side};
+        surfaces = surfaces_of(samples, gap);
+    } else if (d > 0.0f) {
+        surfaces.first.d = d;
+        surfaces.first.share = 1.0f;
+    }
+    store(surfaces.first, texels + begin + at, parts + begin + at);
+    store(surfaces.behind, texels + second + at, parts + second + at);
 }
 
 // --- Patches -----------------
@@ -263,7 +318,7 @@ inline MicroPatch patch_of(const TexelMap map, const int at, const float d, cons
     patch.reach = fmax(fmax(d, fmax(left, right)), fmax(top, bottom));
     patch.least = fmin(fmin(d, fmin(left, right)), fmin(top, bottom));
     patch.flags = FULL | flags;
-    if (map.parts) {
+    if (map.parts && map.texels[at].y < 1.0f) {
         const float4 part = map.parts[at];
         patch.x0 = part.s0;
         patch.x1 = part.s1;

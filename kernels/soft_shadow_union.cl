@@ -294,7 +294,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     bool whole = true;
                     Rectangle rectangle;
                     if (at.z == 0) {
-                        rectangle = rectangle_of_texel(texels[number].x, edges[number], parts ? parts[number] : (float4)(0.0f, 1.0f, 0.0f, 1.0f), at.x, at.y, cell);
+                        rectangle = rectangle_of_texel(texels[number].x, edges[number], parts && texels[number].y < 1.0f ? parts[number] : (float4)(0.0f, 1.0f, 0.0f, 1.0f), at.x, at.y, cell);
                     } else {
                         // A part of a patch will do where the patch is small, as the receivers see it.
                         __global const MicroPatch* const p = patches + number;

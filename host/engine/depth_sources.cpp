@@ -7,6 +7,7 @@
 
 #include "depth_image/views.hpp"
 #include "engine/geometry.hpp"
+#include "scene/fine_depth.hpp"
 #include "scene/light_space.hpp"
 #include "scene/lights.hpp"
 #include "technique/techniques.hpp"
@@ -104,7 +105,8 @@ namespace {
 
 bool shows_nothing(const DepthMap& map)
 {
-    return std::ranges::none_of(map.depth, [](float z) { return std::isfinite(z); });
+    const auto nothing = [](float z) { return !std::isfinite(z); };
+    return std::ranges::all_of(map.depth, nothing) && (!map.fine || std::ranges::all_of(map.fine->depth, nothing));
 }
 
 DepthMap empty_view(int width, int height)
@@ -114,27 +116,39 @@ DepthMap empty_view(int width, int height)
 
 } // namespace
 
-Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::LateContext>& device, bool with_images, int layers)
+TracedViews views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, const ViewRequest& request,
+                     const std::shared_ptr<const opencl::LateContext>& device, bool with_images)
 {
     const Geometry::State& state = geometry.state();
-    Views views{empty_view(width, height), empty_view(width, height), {}, {}};
+    TracedViews views{.front = empty_view(width, height), .back = empty_view(width, height), .layers = {}, .normals = {}};
+    const bool images_too = with_images && state.any_seen(role);
     if (state.any_mesh(role)) {
         const auto tracer = role == &Object::casts ? state.casters() : state.receivers();
-        const bool exact = role == &Object::receives && !(with_images && state.any_seen(role));
-        if (front) views.front = tracer->front(camera, width, height, exact ? &views.normals : nullptr);
-        if (back) views.back = tracer->back(camera, width, height);
-        if (layers > 0) views.layers = tracer->layers(camera, width, height, layers + 1);
-        if (!views.layers.empty()) views.layers.erase(views.layers.begin()); // the front itself
+        ViewRequest of_meshes = request;
+        of_meshes.normals = request.normals && !images_too;
+        if (images_too) of_meshes.fine = 0; // images have no more than their pixels
+        TracedViews traced = tracer->views(camera, width, height, of_meshes);
+        if (request.front) views.front = std::move(traced.front);
+        if (request.back) views.back = std::move(traced.back);
+        views.layers = std::move(traced.layers);
+        views.normals = std::move(traced.normals);
         while (!views.layers.empty() && shows_nothing(views.layers.back())) views.layers.pop_back();
     }
-    if (!with_images) return views;
-    const auto images = state.images(role, device);
-    if (images.empty()) return views;
+    if (!images_too) return views;
     opencl::Work work(device ? device : std::make_shared<const opencl::LateContext>(""));
-    for (const auto& image : images) add_view(work, *image, camera, views.front, views.back);
+    for (const auto& image : state.images(role, device)) add_view(work, *image, camera, views.front, views.back);
     return views;
 }
+
+namespace {
+
+// Steps of disparity between two texels that let half a texel of the light through at the most (kernels/micro_patches.cl): of the finer axis.
+double gap_of(const LightFrame& light, const Camera& camera, int width, int height)
+{
+    return std::min(camera.half_extent.x / (light.half_u * width), camera.half_extent.y / (light.half_v * height));
+}
+
+} // namespace
 
 Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
                                const std::shared_ptr<const opencl::LateContext>& device)
@@ -151,7 +165,15 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     // Depth images among what casts have a front and a back alone.
     const bool render_layers = needs.layers > 0 && occluders.layers.empty() && casters && !geometry.state().any_seen(&Object::casts);
     if (render_front || render_back || render_layers) {
-        Views views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, render_front, render_back, device, !needs.depth_images, render_layers ? needs.layers : 0);
+        const bool all_rendered = render_front == needs.front && render_back == needs.back && render_layers == (needs.layers > 0);
+        const double texels = static_cast<double>(occluders.width) * occluders.height * (render_front + render_back + (render_layers ? needs.layers : 0));
+        const ViewRequest request{.front = render_front,
+                                  .back = render_back,
+                                  .layers = render_layers ? needs.layers : 0,
+                                  .first_layer = 1,
+                                  .fine = all_rendered && texels <= needs.fine_texels ? needs.fine : 0,
+                                  .gap = gap_of(light_frame(light), camera, occluders.width, occluders.height)};
+        TracedViews views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, request, device, !needs.depth_images);
         if (render_front) occluders.front = std::move(views.front);
         if (render_back) occluders.back = std::move(views.back);
         if (render_layers) occluders.layers = std::move(views.layers);
@@ -176,7 +198,7 @@ Receivers receivers_with_depth(const Receivers& given, const Light& light, const
         resolve_camera(receivers.camera, light, geometry.objects(), receivers.width, receivers.height, "receivers.camera");
     if (!receivers.depth) {
         if (!geometry.state().any(&Object::receives)) missing("receivers.depth", "receive");
-        Views views = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, true, false, device);
+        TracedViews views = views_of(geometry, &Object::receives, camera, receivers.width, receivers.height, {.front = true, .normals = true}, device);
         receivers.depth = std::move(views.front);
         receivers.normals = views.normals.empty() ? nullptr : std::make_shared<const SurfaceNormals>(SurfaceNormals{std::move(views.normals)});
         // What was seen of a depth image is as good as its planes.

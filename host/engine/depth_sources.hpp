@@ -6,6 +6,7 @@
 #include "scene/camera.hpp"
 #include "scene/ground.hpp"
 #include "technique/verbs.hpp"
+#include "trace/tracer.hpp"
 
 namespace penumbra {
 
@@ -26,14 +27,10 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
 Receivers receivers_with_depth(const Receivers& given, const Light& light, const Geometry& geometry,
                                const std::shared_ptr<const opencl::LateContext>& device);
 
-// What a camera sees of the objects of a role: triangles by rays, depth images by walks. What is not asked for is empty.
-struct Views {
-    DepthMap front, back;
-    std::vector<DepthMap> layers = {}; // of triangles, behind the front
-    std::vector<DepthVector> normals; // of the front's triangles, towards the camera and in its coordinates; empty where images are among it
-};
-Views views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, bool front, bool back,
-               const std::shared_ptr<const opencl::LateContext>& device, bool with_images = true, int layers = 0);
+// What a camera sees of the objects of a role: triangles by rays, depth images by walks, which have no layers. `normals` are of triangles, where no image is
+// among them. Trailing layers that show nothing are left out.
+TracedViews views_of(const Geometry& geometry, bool Object::*role, const Camera& camera, int width, int height, const ViewRequest& request,
+                     const std::shared_ptr<const opencl::LateContext>& device, bool with_images = true);
 
 // What is fitted to receivers of somebody else's depth; null for depth that is exact.
 std::shared_ptr<const DepthSurface> surface_of(const Receivers& receivers, const Camera& camera,

@@ -211,7 +211,7 @@ void add_field(Prepared::State& state, const Casting& casting, const Geometry& g
     const Stopwatch watch;
     try {
         const Camera camera = occluder_camera(state.light, LightCamera{}, geometry.objects(), field_side, field_side, left_out);
-        const Views views = views_of(geometry, &Object::casts, camera, field_side, field_side, true, true, state.device);
+        const TracedViews views = views_of(geometry, &Object::casts, camera, field_side, field_side, {.front = true, .back = true}, state.device);
         const std::array<const DepthMap*, 2> both{&views.front, &views.back};
         state.field = std::make_shared<const OccluderField>(frame, camera, both, 1);
     } catch (const Error& error) {

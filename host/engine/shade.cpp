@@ -56,9 +56,9 @@ void make_grey(Image& image)
 DepthMap light_view_depth(const Prepared::State& state, const Receivers& receivers, const Camera& camera, int resolution)
 {
     if (state.receiver_geometry)
-        return views_of(*state.receiver_geometry, &Object::receives, state.light_view, resolution, resolution, true, false, state.device).front;
+        return views_of(*state.receiver_geometry, &Object::receives, state.light_view, resolution, resolution, {.front = true}, state.device).front;
     const Object shown{.name = "receivers", .mesh = {}, .casts = false, .receives = true, .seen = SeenSurface{*receivers.depth, camera, 0}};
-    return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, true, false, state.device).front;
+    return views_of(Geometry({shown}), &Object::receives, state.light_view, resolution, resolution, {.front = true}, state.device).front;
 }
 
 // What of the light's samples nobody knows.

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "scene/fine_depth.hpp"
 #include "scene/parallel.hpp"
 
 namespace penumbra {
@@ -44,6 +46,24 @@ OccluderField::OccluderField(const LightFrame& light, const Camera& view, std::s
     while (levels_.back().width > 1 || levels_.back().height > 1) add_level();
 }
 
+namespace {
+
+// What the samples of a row's texels show beside their depth; `begin`: the row's first texel.
+void add_samples(const FineDepth& fine, std::size_t begin, std::vector<float>& near, std::vector<float>& far)
+{
+    for (std::size_t x = 0; x < near.size(); ++x) {
+        const std::int32_t block = (*fine.blocks)[begin + x];
+        if (block < 0) continue;
+        for (const float z : std::span(fine.depth).subspan(static_cast<std::size_t>(block) * fine.block_size(), fine.block_size())) {
+            if (!(z > 0 && z <= std::numeric_limits<float>::max())) continue;
+            near[x] = std::min(near[x], z);
+            far[x] = std::max(far[x], z);
+        }
+    }
+}
+
+} // namespace
+
 // A row of cells: first down the columns of every map, then across.
 void OccluderField::add_row(std::span<const DepthMap* const> maps, int row, int joined, std::vector<float>& near, std::vector<float>& far, Level& level) const
 {
@@ -61,6 +81,7 @@ void OccluderField::add_row(std::span<const DepthMap* const> maps, int row, int 
                 near[x] = low < near[x] ? low : near[x];
                 far[x] = high > far[x] ? high : far[x];
             }
+            if (map->fine) add_samples(*map->fine, static_cast<std::size_t>(y) * width, near, far);
         }
     const std::size_t begin = static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width);
     for (int cell = 0; cell < level.width; ++cell) {

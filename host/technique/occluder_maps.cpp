@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/fine_depth.hpp"
+
 namespace penumbra {
 namespace {
 
@@ -11,6 +13,25 @@ constexpr double point_light_scale = 1e18;
 float light_scale(double tangent, double half_extent)
 {
     return static_cast<float>(half_extent > 0 ? std::min(tangent / (2 * half_extent), point_light_scale) : point_light_scale);
+}
+
+// Only what every map has of the same texels: as an Engine renders them.
+void upload_fine(opencl::Work& work, const std::vector<const DepthMap*>& maps, DeviceDepth& result)
+{
+    if (maps.empty() || !maps.front()->fine) return;
+    const FineDepth& first = *maps.front()->fine;
+    for (const DepthMap* map : maps)
+        if (!map->fine || map->fine->side != first.side || map->fine->blocks != first.blocks || map->fine->depth.size() != first.depth.size()) return;
+    if (first.blocks->size() != maps.front()->depth.size()) return;
+    FineOnDevice& fine = result.depth.fine;
+    fine.side = first.side;
+    fine.samples = first.depth.size();
+    result.blocks = work.lend(std::span<const cl_int>(*first.blocks), "texels with samples");
+    fine.blocks = result.blocks.memory();
+    for (const DepthMap* map : maps) {
+        result.uploaded.push_back(work.lend(std::span<const float>(map->fine->depth), "samples of texels"));
+        fine.depth.push_back(result.uploaded.back().memory());
+    }
 }
 
 } // namespace
@@ -30,16 +51,19 @@ DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bo
                                  .layers = {}},
                        .uploaded = {}};
     OccluderDepth& depth = result.depth;
+    std::vector<const DepthMap*> shown;
     const auto upload = [&](const DepthMap& map, const char* what) {
         if (result.uploaded.empty()) work.stage("upload occluders");
         depth.precision = std::max(depth.precision, map.precision);
         result.uploaded.push_back(work.lend(std::span<const float>(map.depth), what));
+        shown.push_back(&map);
         return result.uploaded.back().memory();
     };
     if (front && from.front) depth.front = upload(*from.front, "front occluder depth");
     if (back && from.back) depth.back = upload(*from.back, "back occluder depth");
     for (const DepthMap& layer : from.layers.first(std::min(from.layers.size(), static_cast<std::size_t>(layers)))) depth.layers.push_back(upload(layer, "occluder depth behind the front"));
     if (result.uploaded.empty()) depth.precision = 0x1p-24;
+    upload_fine(work, shown, result);
     return result;
 }
 

@@ -11,6 +11,14 @@
 
 namespace penumbra {
 
+// What FineDepth holds of front, back and layers, in this order; side 0: nothing.
+struct FineOnDevice {
+    int side = 0;
+    cl::Buffer blocks;
+    std::vector<cl::Buffer> depth; // of each map
+    std::size_t samples = 0;       // of each map
+};
+
 // Planar depth as uploaded, with the view it was taken from. `back` may be empty.
 struct OccluderDepth {
     LightFrame light;
@@ -19,6 +27,7 @@ struct OccluderDepth {
     double precision = 0; // relative, of the depths
     cl::Buffer front, back;
     std::vector<cl::Buffer> layers; // behind the front
+    FineOnDevice fine = {};
 };
 
 // The program of occluders.cl by itself (see receivers_program).
@@ -29,6 +38,7 @@ opencl::Specialisation occluders_program();
 struct DeviceDepth {
     OccluderDepth depth;
     std::vector<opencl::Buffer<float>> uploaded;
+    opencl::Buffer<cl_int> blocks = {};
 };
 DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back, int layers = 0);
 

@@ -49,6 +49,9 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
 // loses little, and a map takes 51 bytes a texel, one that was reduced 133.
 constexpr double most_union_texels = 1 << 21;
 
+// Samples along one side of texels in which something begins or ends, of maps that are rendered (docs/soft_shadow_maps.md).
+constexpr int fine_side = 4;
+
 // The size that a map is shaded with.
 MapSize size_of(const OccluderDepth& depth, const SoftShadowMap& settings)
 {
@@ -59,21 +62,55 @@ MapSize size_of(const OccluderDepth& depth, const SoftShadowMap& settings)
     return reduced_size(depth.width, depth.height, std::max(1, static_cast<int>(std::max(depth.width, depth.height) * std::sqrt(most_union_texels / texels))));
 }
 
+// Maps of a union, and of each the samples of some texels where there are such.
+struct Shown {
+    std::vector<cl::Buffer> depth, fine;
+};
+
+// Front and layers: entries and exits in turn.
+Shown surfaces_in_order(const OccluderDepth& depth, bool back)
+{
+    Shown shown{{depth.front}, {}};
+    shown.depth.insert(shown.depth.end(), depth.layers.begin(), depth.layers.end());
+    shown.fine = depth.fine.depth;
+    if (back && !shown.fine.empty()) shown.fine.erase(shown.fine.begin() + 1); // front, back, layers
+    return shown;
+}
+
+// Adds the back map, unless the maps before it show all of it. Else it stays whole: surfaces in order change from one to another from texel to texel, the back map
+// less so, and what is joined to its neighbours hides better.
+bool add_back(opencl::Work& work, const OccluderDepth& depth, std::size_t number, Shown& maps)
+{
+    const cl::Buffer fine = depth.fine.depth.empty() ? cl::Buffer() : depth.fine.depth[number];
+    if (maps.depth.size() > 1 && !shows_more(work, depth.back, maps.depth, count_of({depth.width, depth.height})) &&
+        (!fine() || !shows_more(work, fine, maps.fine, depth.fine.samples)))
+        return false;
+    maps.depth.push_back(depth.back);
+    if (fine()) maps.fine.push_back(fine);
+    return true;
+}
+
 // The maps of a union: front and back, or entries and exits in turn, and the back for what lies behind them.
 PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepared, const OccluderDepth& depth, MapSize from, MapSize size)
 {
     const Sides sides = prepared.settings.sides;
-    std::vector<cl::Buffer> maps;
+    Shown maps = sides == Sides::back ? Shown{} : surfaces_in_order(depth, sides == Sides::both);
+    const int entries = static_cast<int>(maps.depth.size());
     std::vector<int> other;
-    if (sides != Sides::back) {
-        maps.push_back(depth.front);
-        maps.insert(maps.end(), depth.layers.begin(), depth.layers.end());
-    }
-    const int entries = static_cast<int>(maps.size());
-    if (sides != Sides::front) maps.push_back(depth.back);
     for (int i = 0; i < entries; ++i) other.push_back(entries > 1 ? ((i ^ 1) < entries ? i ^ 1 : -1) : sides == Sides::both ? 1 : -1);
-    if (sides != Sides::front) other.push_back(entries > 0 ? 0 : -1);
-    return prepare_union(work, {.depth = maps, .other = other, .from = from, .size = size, .precision = prepared.precision, .shape = depth.light.shape}, prepared.view);
+    if (sides != Sides::front && add_back(work, depth, sides == Sides::both ? 1 : 0, maps)) other.push_back(entries > 0 ? 0 : -1);
+    return prepare_union(work,
+                         {.depth = maps.depth,
+                          .fine = maps.fine,
+                          .fine_side = depth.fine.side,
+                          .fine_samples = depth.fine.samples,
+                          .blocks = depth.fine.blocks,
+                          .other = other,
+                          .from = from,
+                          .size = size,
+                          .precision = prepared.precision,
+                          .shape = depth.light.shape},
+                         prepared.view);
 }
 
 // The program with every kernel that the technique launches.
@@ -249,6 +286,8 @@ Needs needs(const SoftShadowMap& settings)
             .back = settings.sides != Sides::front,
             .layers = settings.visibility == PatchVisibility::united && settings.sides != Sides::back ? settings.layers : 0,
             .receivers_from_light = settings.project,
+            .fine = settings.visibility == PatchVisibility::united && settings.resolution == 0 ? fine_side : 0,
+            .fine_texels = most_union_texels,
             .maps_tell_all = settings.visibility == PatchVisibility::united}; // a sum's larger texels reach beyond what the maps show
 }
 

@@ -61,29 +61,36 @@ const LightRows& light_rows(LightShape shape)
     return shape == LightShape::rectangle ? rectangle : disc;
 }
 
-// The texels of all maps. A larger map becomes two: the nearest surfaces of its texels, and those behind them.
+// The texels of all maps. Where more is known of them than a depth, by a larger map or by samples, a map becomes two: the nearest surfaces of its texels, and
+// those behind them.
 void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& view, const opencl::Specialisation& program, PreparedUnion& prepared)
 {
     const MapSize from = maps.from, size = maps.size;
     const std::size_t count = count_of(size), given = maps.depth.size();
-    const bool reduced = count_of(from) > count;
-    const std::size_t all = (reduced ? 2 : 1) * given;
+    const bool reduced = count_of(from) > count, sampled = !reduced && maps.fine.size() == given;
+    const std::size_t all = (reduced || sampled ? 2 : 1) * given;
     if (std::max(all * count, count_of(from)) > std::numeric_limits<cl_int>::max())
         throw Error::at(ErrorCode::too_large, "technique.resolution", "comes to " + std::to_string(all * count) + " texels of all maps", "expected less than 2^31, from maps of less than that");
     prepared.maps = static_cast<int>(all);
     prepared.texels = work.buffer<cl_float2>(all * count, "occluder texels");
-    if (reduced) prepared.parts = work.buffer<cl_float4>(all * count, "covered parts of texels");
-    const cl_float2 gap = gap_of(view);
+    if (reduced || sampled) prepared.parts = work.buffer<cl_float4>(all * count, "covered parts of texels");
+    const cl_float2 gaps = gap_of(view);
+    const float gap = std::min(gaps.s[0], gaps.s[1]);
+    const auto disparities_of = [&](const cl::Buffer& depth, std::size_t samples) {
+        const auto disparities = work.buffer<float>(samples, "disparities");
+        work.launch(program, "disparities_of_map", {samples, 1}, {256, 1}, samples * 8, static_cast<cl_int>(samples), depth, disparities);
+        return disparities;
+    };
     for (std::size_t i = 0; i < given; ++i) {
         const auto begin = static_cast<cl_int>(i * count), second = static_cast<cl_int>((given + i) * count);
-        if (!reduced) {
+        if (reduced)
+            work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count * 48, dimensions(from), disparities_of(maps.depth[i], count_of(from)), dimensions(size),
+                        begin, second, gap, prepared.texels, prepared.parts);
+        else if (sampled)
+            work.launch(program, "surfaces_of_samples", grid_of(size), {16, 4}, maps.fine_samples * 4 + count * 56, dimensions(size), begin, second, gap, maps.fine_side, maps.blocks, maps.depth[i],
+                        disparities_of(maps.fine[i], maps.fine_samples), prepared.texels, prepared.parts);
+        else
             work.launch(program, "texels_of_map", grid_of(size), {16, 8}, count * 12, dimensions(size), begin, maps.depth[i], prepared.texels);
-            continue;
-        }
-        const auto disparities = work.buffer<float>(count_of(from), "disparities");
-        work.launch(program, "disparities_of_map", {count_of(from), 1}, {256, 1}, count_of(from) * 8, static_cast<cl_int>(count_of(from)), maps.depth[i], disparities);
-        work.launch(program, "surfaces_of_texels", grid_of(size), {16, 4}, count_of(from) * 4 + count * 48, dimensions(from), disparities, dimensions(size), begin, second,
-                    std::min(gap.s[0], gap.s[1]), prepared.texels, prepared.parts);
     }
 }
 
@@ -123,6 +130,20 @@ opencl::Specialisation union_program(int lanes)
 {
     return {"soft_shadow_union.cl",
             {{"LANES", std::to_string(lanes)}, {"ITEM_ROWS", std::to_string(item_rows(lanes))}, {"TILE_ROWS", std::to_string(tile_rows)}}};
+}
+
+bool shows_more(opencl::Work& work, const cl::Buffer& depth, std::span<const cl::Buffer> others, std::size_t count)
+{
+    const opencl::Specialisation program = union_program(work.context().quirks().lanes);
+    const auto unshown = work.buffer<float>(count, "depth that other maps do not show");
+    constexpr std::array<cl_int, 1> none{0};
+    opencl::Buffer<cl_int> some;
+    for (std::size_t i = 0; i < others.size(); ++i) {
+        // Of the last alone: what is left when all are taken off.
+        some = work.upload(std::span<const cl_int>(none), "whether something is left");
+        work.launch(program, "unshown_depth", {count, 1}, {256, 1}, count * 12, static_cast<cl_int>(count), i == 0 ? depth : unshown.memory(), others[i], unshown, some);
+    }
+    return work.read(some).front() != 0;
 }
 
 PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view)

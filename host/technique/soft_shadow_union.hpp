@@ -26,6 +26,10 @@ struct PreparedUnion {
 // its bodies, the next entry's exit or the last exit's entry; -1: none.
 struct UnionMaps {
     std::span<const cl::Buffer> depth;
+    std::span<const cl::Buffer> fine; // of each map the samples of some texels, fine_side x fine_side a block (FineDepth); none: there are no such
+    int fine_side;
+    std::size_t fine_samples;
+    cl::Buffer blocks;
     std::span<const int> other;
     MapSize from, size;
     double precision; // relative, of the depths
@@ -33,6 +37,9 @@ struct UnionMaps {
 };
 
 opencl::Specialisation union_program(int lanes);
+
+// Whether a map shows something that none of the others does, `count` depths each.
+bool shows_more(opencl::Work& work, const cl::Buffer& depth, std::span<const cl::Buffer> others, std::size_t count);
 
 PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view);
 

@@ -58,6 +58,10 @@ struct Needs {
     bool whole_view = false;
     // Receiving::from_light: what the light sees of the receivers. Their mask is then shaded whole.
     bool receivers_from_light = false;
+    // Of maps that are rendered: samples along one side of texels in which something begins or ends (FineDepth); 0: none. Maps with more texels in all than
+    // `fine_texels` go without.
+    int fine = 0;
+    double fine_texels = 0;
     // What its maps show between a receiver and the light, and the receiver's own horizon, are all that darkens it.
     bool maps_tell_all = false;
     // Its penumbrae are not the light's, so that nothing tells receivers from their neighbours.

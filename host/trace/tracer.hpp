@@ -15,6 +15,26 @@
 
 namespace penumbra {
 
+// What a camera is to see.
+struct ViewRequest {
+    bool front = false, back = false;
+    int layers = 0, first_layer = 0; // surfaces first_layer, first_layer + 1, ... in order of depth
+    bool normals = false;
+    // Samples along one side of the texels in which something begins or ends, at the most: fewer where they would be more than `fine_share` a
+    // texel of the map. 0: none. Perspective cameras alone.
+    int fine = 0;
+    double fine_share = 4;
+    double gap = 0; // steps of 1 / depth up to which neighbouring texels show one surface, whatever lies between
+};
+
+// Of each pixel the nearest surface (front), the furthest back-facing one, whose normal points along the ray (back), and those in order of
+// depth (layers; 0 is the front). The same hit reported by two triangles that share an edge counts once.
+struct TracedViews {
+    DepthMap front, back;
+    std::vector<DepthMap> layers;
+    std::vector<DepthVector> normals; // of the front's triangle, towards the camera and in its coordinates; 0 where nothing is seen
+};
+
 class Tracer {
 public:
     // Builds a hierarchy of the objects' triangles. Triangles of no area or with coordinates that are not finite are left out and counted.
@@ -27,12 +47,12 @@ public:
     std::uint64_t bytes() const; // of the hierarchy, as Embree's memory monitor counts
 
     // Depth of what the camera sees through each pixel's centre.
-    // nearest surface; `normals`, where it is not null: of its triangle, towards the camera and in its coordinates, 0 where nothing is seen
-    DepthMap front(const Camera& camera, int width, int height, std::vector<DepthVector>* normals = nullptr) const;
-    DepthMap back(const Camera& camera, int width, int height) const;  // furthest back-facing surface (normal along the ray)
-    // Surfaces 0, 1, ... `count` - 1 along each ray in order of depth (0 is `front`). The same hit reported by two triangles that share an
-    // edge counts once.
-    std::vector<DepthMap> layers(const Camera& camera, int width, int height, int count) const;
+    DepthMap front(const Camera& camera, int width, int height) const { return views(camera, width, height, {.front = true}).front; }
+    DepthMap back(const Camera& camera, int width, int height) const { return views(camera, width, height, {.back = true}).back; }
+    std::vector<DepthMap> layers(const Camera& camera, int width, int height, int count) const { return views(camera, width, height, {.layers = count}).layers; }
+
+    // All of that from one ray a pixel. Throws usage for a size below 1 and a count below 0.
+    TracedViews views(const Camera& camera, int width, int height, const ViewRequest& request) const;
 
     struct Impl;
     const Impl& impl() const { return *impl_; }

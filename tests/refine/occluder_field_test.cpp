@@ -5,6 +5,7 @@
 
 #include "refine/occluder_field.hpp"
 #include "scene/camera.hpp"
+#include "scene/fine_depth.hpp"
 
 namespace penumbra::test {
 namespace {
@@ -63,6 +64,20 @@ TEST(OccluderField, WhatCannotCastOnThePatchDoesNotCount)
     const double rim = 2 * 0.25 * 2; // half the plate's width at depth 4, from the light's centre
     EXPECT_EQ(field.passing(patch(field, rim + 0.95, 0, 4, 0.01, 1.9), 0.25), Passing::much);
     EXPECT_NE(field.passing(patch(field, rim + 1.2, 0, 4, 0.01, 1.9), 0.25), Passing::much);
+}
+
+// What only the samples of a texel show casts too.
+TEST(OccluderField, SamplesCount)
+{
+    Field empty(INFINITY);
+    const OccluderField nothing = empty.field();
+    EXPECT_EQ(nothing.passing(patch(nothing, 0, 0, 4, 0.01, 1.9), 0.25), Passing::nothing);
+    std::vector<std::int32_t> blocks(64 * 64, -1);
+    blocks[32 * 64 + 32] = 0;
+    FineDepth fine{.side = 2, .blocks = std::make_shared<const std::vector<std::int32_t>>(blocks), .depth = {INFINITY, INFINITY, 2, INFINITY}};
+    empty.map.fine = std::make_shared<const FineDepth>(fine);
+    const OccluderField field = empty.field();
+    EXPECT_EQ(field.passing(patch(field, 0, 0, 4, 0.01, 1.9), 0.25), Passing::much);
 }
 
 // Receivers on the plate itself: its own surface is no caster; what lies just above them is, and no step resolves that.

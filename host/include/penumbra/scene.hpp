@@ -72,6 +72,8 @@ struct DepthStep {
     double unit = 1;
 };
 
+struct FineDepth;
+
 // Planar depth (distance along the viewing axis, positive, scene units), row 0 at the top; `nothing_there` where there is nothing.
 struct DepthMap {
     int width = 0;
@@ -83,6 +85,8 @@ struct DepthMap {
     bool from_image = false;
     double noise = 0; // standard error of a depth over the depth; 0: estimated from the image
     DepthStep step = {};
+    // What an Engine saw of the texels' parts where it rendered this map (with_depth). Who changes the depth clears it.
+    std::shared_ptr<const FineDepth> fine = {};
 
     float& at(int x, int y) { return depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
     float at(int x, int y) const
