@@ -1,6 +1,7 @@
 #include "rows.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 
 namespace penumbra::bench {
@@ -49,17 +50,36 @@ void print_header()
 {
     std::puts("bench,scene,technique,settings,parameter,mae_shadow,rmse_shadow,bias_shadow,max,p99_shadow,prepare_ms,shade_ms_min,shade_ms_"
               "median,"
-              "shade_ms_max,kernel_ms,pairs,pairs_per_s,device_bytes");
+              "shade_ms_max,kernel_ms,pairs,pairs_per_s,device_bytes,render_ms");
 }
 
 void print(const Row& r)
 {
-    std::printf("%s,%s,%s,%s,%g,%.5f,%.5f,%.5f,%.5f,%.5f,%.3f,%.3f,%.3f,%.3f,%.3f,%.0f,%.4g,%.0f\n", r.bench.c_str(), r.scene.c_str(),
+    std::printf("%s,%s,%s,%s,%g,%.5f,%.5f,%.5f,%.5f,%.5f,%.3f,%.3f,%.3f,%.3f,%.3f,%.0f,%.4g,%.0f,%.3f\n", r.bench.c_str(), r.scene.c_str(),
                 r.technique.c_str(), r.settings.c_str(), r.parameter, r.error.mae_shadow, r.error.rmse_shadow, r.error.bias_shadow,
                 r.error.max, r.error.p99_shadow, r.prepare_ms, r.shade_ms.min, r.shade_ms.median, r.shade_ms.max, r.kernel_ms, r.pairs,
-                r.pairs_per_s, r.device_bytes);
+                r.pairs_per_s, r.device_bytes, r.render_ms);
     std::fflush(stdout);
 }
+
+namespace {
+
+// What a mask from the objects takes beside preparing and shading. Receivers are given.
+double render_time(const Scene& ready, const Scene& scene, const Technique& technique, int runs)
+{
+    if (!ready.occluders.front && !ready.occluders.back) return 0;
+    Scene given = ready;
+    given.occluders = scene.occluders;
+    std::vector<double> times;
+    for (int run = 0; run < std::min(runs, 3); ++run) {
+        const auto begin = std::chrono::steady_clock::now();
+        with_depth(given, technique);
+        times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    }
+    return timing_of(times).median;
+}
+
+} // namespace
 
 Row measure(const Engine& engine, const Scene& scene, const Technique& technique, const Image& reference, int runs)
 {
@@ -83,6 +103,7 @@ Row measure(const Engine& engine, const Scene& scene, const Technique& technique
     row.pairs = static_cast<double>(mask.report.pairs);
     row.pairs_per_s = row.pairs / (row.kernel_ms * 1e-3);
     if (mask.report.receivers > 0) row.share_shaded = static_cast<double>(mask.report.receivers_shaded) / static_cast<double>(mask.report.receivers);
+    row.render_ms = render_time(ready, scene, technique, runs);
     row.device_bytes = static_cast<double>(mask.report.peak_device_bytes);
     return row;
 }

@@ -24,6 +24,7 @@ struct Row {
     double pairs_per_s = 0; // of the kernels' time, or of the wall time for rays
     double device_bytes = 0;
     double share_shaded = 1; // of the receivers, with a tolerance
+    double render_ms = 0;    // median: occluder depth from the objects, their hierarchy with it; 0: the technique needs none
 };
 
 // Prints what is measured, as a comment: version, device, driver.
