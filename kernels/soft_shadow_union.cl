@@ -60,6 +60,11 @@ typedef struct {
     Along left, right, bottom, top;
 } Rectangle;
 
+// How wide a patch may be that stands for smaller ones, against what the tolerance allows: one that is covered whole hides what they hide; of one that is
+// covered in part only the area is right, and what several maps show of one outline lies apart, which darkens (docs/tolerance.md).
+#define COARSE_WHOLE 2.0f
+#define COARSE_PART 0.5f
+
 // Where the outermost place of an edge lies, the one at the lower end of the axis (`before`: of that axis) or at the upper end: nothing shines between two
 // rectangles that share the edge.
 inline floatn outermost(const float edge, const floatn place, const Along along, const bool lower, const floatn own, const floatn least, const float scale)
@@ -298,8 +303,8 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     } else {
                         // A part of a patch will do where the patch is small, as the receivers see it.
                         __global const MicroPatch* const p = patches + number;
-                        const float over_receivers = p->least - search.box.s5;
-                        const bool small = cell.x * scale.x <= coarse * over_receivers && cell.y * scale.y <= coarse * over_receivers && p->reach - p->least <= coarse * over_receivers;
+                        const float over_receivers = p->least - search.box.s5, wide = (p->flags & FULL ? COARSE_WHOLE : COARSE_PART) * coarse * over_receivers;
+                        const bool small = cell.x * scale.x <= wide && cell.y * scale.y <= wide && p->reach - p->least <= coarse * over_receivers;
                         whole = small || (p->flags & SOLID) || ((p->flags & FULL) && may_be_one(search, p->reach, p->least));
                         if (whole) {
                             rectangle = rectangle_of(*p, at.x, at.y, cell);
