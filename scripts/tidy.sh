@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 # A compile database for clang: GCC's precompiled headers mean nothing to it. Of the build's own files only the database is read.
 folder=build/tidy
-cmake --preset release -B "$folder" -DCMAKE_CXX_COMPILER=clang++-15 -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DPENUMBRA_TESTS=OFF -DPENUMBRA_BENCH=OFF >/dev/null
+cmake --preset release -B "$folder" -DCMAKE_CXX_COMPILER=clang++-15 -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DPENUMBRA_TOGETHER=OFF -DPENUMBRA_TESTS=OFF -DPENUMBRA_BENCH=OFF >/dev/null
 
 if [ $# -gt 0 ]; then
     files=("$@")
