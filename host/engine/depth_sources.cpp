@@ -54,7 +54,7 @@ Camera occluder_camera(const Light& light, const CameraSpec& spec, const std::ve
                        const LeftOut& left_out)
 {
     const LightFrame frame = light_frame(light);
-    const Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera", left_out);
+    Camera camera = resolve_camera(spec, light, objects, width, height, "occluders.camera", left_out);
     if (std::holds_alternative<LightCamera>(spec)) return camera;
 
     // A pinhole will do if it is the light's own view: same place, same axes to within a ten-thousandth.

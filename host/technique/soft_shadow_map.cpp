@@ -97,6 +97,7 @@ PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepa
     Shown maps = sides == Sides::back ? Shown{} : surfaces_in_order(depth, sides == Sides::both);
     const int entries = static_cast<int>(maps.depth.size());
     std::vector<int> other;
+    other.reserve(maps.depth.size() + 1);
     for (int i = 0; i < entries; ++i) other.push_back(entries > 1 ? ((i ^ 1) < entries ? i ^ 1 : -1) : sides == Sides::both ? 1 : -1);
     if (sides != Sides::front && add_back(work, depth, sides == Sides::both ? 1 : 0, maps)) other.push_back(entries > 0 ? 0 : -1);
     return prepare_union(work,

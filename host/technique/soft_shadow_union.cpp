@@ -77,7 +77,7 @@ void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& v
     const cl_float2 gaps = gap_of(view);
     const float gap = std::min(gaps.s[0], gaps.s[1]);
     const auto disparities_of = [&](const cl::Buffer& depth, std::size_t samples) {
-        const auto disparities = work.buffer<float>(samples, "disparities");
+        auto disparities = work.buffer<float>(samples, "disparities");
         work.launch(program, "disparities_of_map", {samples, 1}, {256, 1}, samples * 8, static_cast<cl_int>(samples), depth, disparities);
         return disparities;
     };
