@@ -11,8 +11,7 @@ kernels=$2
 list=$3
 
 # spir64 stands for any device (generic OpenCL address spaces, no vector registers to lean on), amdgcn for a real GPU, the empty one for the
-# host, which is what PoCL compiles for, with
-# the header that PoCL 3.1 is given. A clang without a back end leaves that one out.
+# host, which is what PoCL compiles for, with the header that PoCL 3.1 is given. A clang without a back end leaves that one out.
 targets=
 for target in spir64 amdgcn-amd-amdhsa; do
     if echo 'kernel void probe(global float* a) { a[get_global_id(0)] = 0.0f; }' |

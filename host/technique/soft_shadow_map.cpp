@@ -49,7 +49,7 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
 // loses little, and a map takes 51 bytes a texel, one that was reduced 133.
 constexpr double most_union_texels = 1 << 21;
 
-// Samples along one side of texels in which something begins or ends, of maps that are rendered (docs/soft_shadow_maps.md).
+// Samples along one side of texels in which something begins or ends, of maps that are rendered (docs/soft_shadow_map.md).
 constexpr int fine_side = 4;
 
 // The size that a map is shaded with.
