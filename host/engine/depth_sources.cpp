@@ -10,6 +10,7 @@
 #include "scene/fine_depth.hpp"
 #include "scene/light_space.hpp"
 #include "scene/lights.hpp"
+#include "technique/occluder_maps.hpp"
 #include "technique/techniques.hpp"
 
 namespace penumbra {
@@ -140,16 +141,6 @@ TracedViews views_of(const Geometry& geometry, bool Object::*role, const Camera&
     return views;
 }
 
-namespace {
-
-// Steps of disparity between two texels that let half a texel of the light through at the most (kernels/micro_patches.cl): of the finer axis.
-double gap_of(const LightFrame& light, const Camera& camera, int width, int height)
-{
-    return std::min(camera.half_extent.x / (light.half_u * width), camera.half_extent.y / (light.half_v * height));
-}
-
-} // namespace
-
 Occluders occluders_with_depth(const Light& light, const Occluders& given, const Geometry& geometry, const Needs& needs, const LeftOut& left_out,
                                const std::shared_ptr<const opencl::LateContext>& device)
 {
@@ -167,12 +158,13 @@ Occluders occluders_with_depth(const Light& light, const Occluders& given, const
     if (render_front || render_back || render_layers) {
         const bool all_rendered = render_front == needs.front && render_back == needs.back && render_layers == (needs.layers > 0);
         const double texels = static_cast<double>(occluders.width) * occluders.height * (render_front + render_back + (render_layers ? needs.layers : 0));
+        const cl_float2 gap = joining_gap(occluder_view(light_frame(light), camera, {occluders.width, occluders.height}));
         const ViewRequest request{.front = render_front,
                                   .back = render_back,
                                   .layers = render_layers ? needs.layers : 0,
                                   .first_layer = 1,
                                   .fine = all_rendered && texels <= needs.fine_texels ? needs.fine : 0,
-                                  .gap = gap_of(light_frame(light), camera, occluders.width, occluders.height)};
+                                  .gap = std::min(gap.s[0], gap.s[1])};
         TracedViews views = views_of(geometry, &Object::casts, camera, occluders.width, occluders.height, request, device, !needs.depth_images);
         if (render_front) occluders.front = std::move(views.front);
         if (render_back) occluders.back = std::move(views.back);

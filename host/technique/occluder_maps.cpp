@@ -77,10 +77,12 @@ MapSize reduced_size(int width, int height, int resolution)
     return {scaled(width), scaled(height)};
 }
 
-OccluderView occluder_view(const OccluderDepth& depth, MapSize size)
+cl_float2 joining_gap(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
+
+OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size)
 {
-    const float scale_x = light_scale(depth.camera.half_extent.x, depth.light.half_u);
-    const float scale_y = light_scale(depth.camera.half_extent.y, depth.light.half_v);
+    const float scale_x = light_scale(camera.half_extent.x, light.half_u);
+    const float scale_y = light_scale(camera.half_extent.y, light.half_v);
     const float texel_x = 2.0f / static_cast<float>(size.width), texel_y = 2.0f / static_cast<float>(size.height);
     return {.width = size.width,
             .height = size.height,

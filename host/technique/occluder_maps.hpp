@@ -59,7 +59,10 @@ MapSize reduced_size(int width, int height, int resolution);
 
 // With k (light_scale of kernels/common/shared.h) for both axes. A light of no extent counts as one so small that every back-projected
 // texel edge lies far outside it or far inside the texel: 10^18 lights across at a disparity step of 1.
-OccluderView occluder_view(const OccluderDepth& depth, MapSize size);
+OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size);
+
+// The step of disparity between two texels that lets half a texel of light through at the most, across and down: up to it they hide as one surface does.
+cl_float2 joining_gap(const OccluderView& view);
 
 // Disparity and covered share at `size`, and the surface's steps; depths are right to the relative `precision`.
 // `program`: one that has the kernels.

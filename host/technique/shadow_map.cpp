@@ -53,7 +53,7 @@ PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& de
     const MapSize size{depth.width, depth.height};
     return {.settings = settings,
             .program = program(),
-            .view = occluder_view(depth, size),
+            .view = occluder_view(depth.light, depth.camera, size),
             .precision = depth.precision,
             .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program())};
 }

@@ -259,7 +259,7 @@ PreparedSmoothie prepare_smoothie(opencl::Work& work, const OccluderDepth& depth
     const opencl::Specialisation built = program(work.context().quirks().lanes);
     return {.settings = settings,
             .program = built,
-            .occluders = occluder_view(depth, size),
+            .occluders = occluder_view(depth.light, depth.camera, size),
             .view = view_of(depth, edges, settings),
             .precision = depth.precision,
             .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, built),

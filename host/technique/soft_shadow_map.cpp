@@ -225,7 +225,7 @@ PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const Occluder
     const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,
                                    .program = program(settings, work.context().quirks().lanes),
-                                   .view = occluder_view(depth, size),
+                                   .view = occluder_view(depth.light, depth.camera, size),
                                    .precision = depth.precision,
                                    .nearest = 0,
                                    .sides = {},

@@ -28,9 +28,6 @@ std::vector<MapSize> level_sizes(MapSize size)
     return sizes;
 }
 
-// The step of disparity between two texels that lets half a texel of light through at the most, across and down.
-cl_float2 gap_of(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
-
 // Where sample (i, k) of the light lies, 0 to 1 (kernels/common/light_pattern.clh).
 std::pair<double, double> sample_place(unsigned i, unsigned k)
 {
@@ -74,7 +71,7 @@ void add_texels(opencl::Work& work, const UnionMaps& maps, const OccluderView& v
     prepared.maps = static_cast<int>(all);
     prepared.texels = work.buffer<cl_float2>(all * count, "occluder texels");
     if (reduced || sampled) prepared.parts = work.buffer<cl_float4>(all * count, "covered parts of texels");
-    const cl_float2 gaps = gap_of(view);
+    const cl_float2 gaps = joining_gap(view);
     const float gap = std::min(gaps.s[0], gaps.s[1]);
     const auto disparities_of = [&](const cl::Buffer& depth, std::size_t samples) {
         auto disparities = work.buffer<float>(samples, "disparities");
@@ -115,7 +112,7 @@ void add_patches(opencl::Work& work, const UnionMaps& maps, const OccluderView& 
     const cl_int2 size = dimensions(maps.size);
     const auto all = static_cast<cl_int>(count), above = static_cast<cl_int>(prepared.above);
     const auto width = static_cast<std::size_t>(sizes[1].width), height = static_cast<std::size_t>(sizes[1].height);
-    work.launch(program, "micro_patches", {width, height * count}, {16, 4}, count * texels * (28 + sizeof(MicroPatch) / 4), size, all, above, static_cast<float>(maps.precision), gap_of(view),
+    work.launch(program, "micro_patches", {width, height * count}, {16, 4}, count * texels * (28 + sizeof(MicroPatch) / 4), size, all, above, static_cast<float>(maps.precision), joining_gap(view),
                 static_cast<cl_int>(static_cast<bool>(prepared.parts)), other, prepared.texels, prepared.parts, prepared.edges, prepared.texel_reach, prepared.reach, prepared.patches);
     work.launch(program, "joined_patches", {static_cast<std::size_t>(sizes.back().width) * joining[0], static_cast<std::size_t>(sizes.back().height) * count * joining[1]}, joining,
                 count * prepared.above * sizeof(MicroPatch), size, all, above, prepared.reach, prepared.patches, nearest);
