@@ -132,11 +132,9 @@ private:
 class Watch {
 public:
     Watch(httplib::Client& client, std::chrono::milliseconds timeout)
-        : thread_([this, &client, timeout] {
+        : at_(std::chrono::steady_clock::now() + timeout), thread_([this, &client] {
               std::unique_lock lock(mutex_);
-              if (done_.wait_for(lock, timeout, [this] { return over_; })) return;
-              rang_ = true;
-              client.stop();
+              if (!done_.wait_until(lock, at_, [this] { return over_; })) client.stop();
           })
     {
     }
@@ -144,9 +142,10 @@ public:
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
 
-    // Whether the time was up.
+    // Whether the time was up. By the clock: cpp-httplib's own timeouts end a read in the same moment, often before this thread does.
     bool end()
     {
+        const bool up = std::chrono::steady_clock::now() >= at_;
         if (thread_.joinable()) {
             {
                 const std::lock_guard lock(mutex_);
@@ -155,13 +154,14 @@ public:
             done_.notify_one();
             thread_.join();
         }
-        return rang_;
+        return up;
     }
 
 private:
+    const std::chrono::steady_clock::time_point at_;
     std::mutex mutex_;
     std::condition_variable done_;
-    bool over_ = false, rang_ = false;
+    bool over_ = false;
     std::thread thread_; // last: it uses the others
 };
 
