@@ -55,13 +55,14 @@ __attribute__((always_inline)) inline floatn hidden(const OcclusionLight light, 
 
 // occlusion_texture: one light, or one part of it.
 //
+//   precision                     relative, of the receivers' depth
 //   planes [light.planes]         in order from the light; layers of one slice beside each other
 //   size                          of the window in texels
 //   levels, data                  prefiltered textures (occlusion_levels.cl)
 //   visibility [height][width]    share of the light that is seen, 0 to 1
 //
 // Launched over work-items, (stride / LANES) x rows.
-__kernel void occlusion_texture(const ReceiverView view, const OcclusionLight light, const int2 size, __global const OcclusionPlane* restrict planes,
+__kernel void occlusion_texture(const ReceiverView view, const float precision, const OcclusionLight light, const int2 size, __global const OcclusionPlane* restrict planes,
                                 __global const OcclusionLevel* restrict levels, __global const element* restrict data, __global const float* restrict xi,
                                 __global const float* restrict eta, __global const float* restrict d, __global float* restrict visibility,
                                 __global const volatile int* stop)
@@ -73,12 +74,15 @@ __kernel void occlusion_texture(const ReceiverView view, const OcclusionLight li
     const Seen p = seen_at(light, xi + at, eta + at, d + at);
     const intn there = load_lanes(d + at) != (floatn)(NO_RECEIVER);
 
+    // A slice hides from receivers that lie behind it by more than their depth may be off.
+    const floatn beyond = fma((floatn)(8.0f * 0x1p-24f + 2.0f * precision), fabs(p.z), (floatn)(2.0f * view.off));
+
     // Product, sum and greatest of all planes; if layered, the sum within each layer (of what a column holds, its first few filled slices).
     floatn lit = one, sum = zero, greatest = zero, of_layer[MOST_LAYERS];
     for (int layer = 0; layer < MOST_LAYERS; ++layer) of_layer[layer] = zero;
     for (int i = 0; i < light.planes; ++i) {
         const OcclusionPlane plane = planes[i];
-        const floatn weight = saturate((p.z - plane.fade_from) * plane.per_fade);
+        const floatn weight = saturate((p.z - beyond - plane.fade_from) * plane.per_fade);
         const intn counts = there & (weight > zero);
         if (NONE(counts)) continue;
         const floatn by = select_lanes(zero, weight * hidden(light, plane, i, p, size, levels, data), counts);

@@ -2,6 +2,7 @@
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
+#include "common/receiver_precision.clh"
 #include "common/shadow_test.clh"
 #include "common/stop.clh"
 
@@ -24,7 +25,7 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));
         const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
-        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 0.5f * taps);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 0.5f * taps);
         sum = 0.0f;
         for (int j = 0; j < taps; ++j)
             for (int i = 0; i < taps; ++i) sum += lit(size, texels, first.x + i, first.y + j, limit);
@@ -48,7 +49,7 @@ __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderVie
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 t = place - 0.5f - convert_float2(low), s = 1.0f - t;
         const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
-        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 2.0f);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 2.0f);
 
         // The B-spline's four weights along each axis; they sum to 1.
         const float2 w[4] = {s * s * s / 6.0f, (4.0f - 6.0f * t * t + 3.0f * t * t * t) / 6.0f, (4.0f - 6.0f * s * s + 3.0f * s * s * s) / 6.0f,

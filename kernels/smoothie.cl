@@ -10,6 +10,7 @@
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
+#include "common/receiver_precision.clh"
 #include "common/shadow_test.clh"
 #include "common/bits.clh"
 #include "common/lanes.clh"
@@ -302,9 +303,9 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
     const float2 place = place_of(occluders, xi[at], eta[at]);
     float seen = 1.0f;
     if (shaded(occluders, place, d[at])) {
-        const float rounding = (8.0f * 0x1p-24f + 2.0f * precision) * d[at];
+        const float rounding = rounding_of(d[at], receiver_precision(receivers, precision, d[at]));
         const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
-        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, precision, 1.0f);
+        const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 1.0f);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 part = place - 0.5f - convert_float2(low);
         seen = 0.0f;

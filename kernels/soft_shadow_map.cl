@@ -139,7 +139,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                         const int at = (y + row) * receivers.stride + x;
                         const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
                         if (first_found)
-                            limits[row] = limits_with_planes(occluders, bias, precision, has_planes, texels, steps, has_planes ? load_lanes(slope_xi + at) : own_d,
+                            limits[row] = limits_with_planes(occluders, bias, receiver_precisions(receivers, precision, own_d), has_planes, texels, steps, has_planes ? load_lanes(slope_xi + at) : own_d,
                                                              has_planes ? load_lanes(slope_eta + at) : own_d, own_xi, own_eta, own_d);
                         add_patches(&sum[row], &lost[row], patches, found, 1.0f - (j + 1) * search.texel.y, 1.0f - j * search.texel.y, scale, own_xi,
                                     own_eta, own_d, limits[row]);

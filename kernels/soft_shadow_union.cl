@@ -228,12 +228,34 @@ inline int rows_of_search(const float8* boxes, const int first, const float near
     return rows;
 }
 
+// Writes what of a textured light LANES receivers see, or as many of them as lie in the row. A row of samples is summed by itself, so that the shares of a white
+// texture add up without rounding.
+inline void write_textured(__global float* to, const uintn* bits, const int channels, __global const float* emission, const int left)
+{
+    for (int channel = 0; channel < channels; ++channel) {
+        floatn seen = (floatn)(0.0f);
+        for (int k = 0; k < SIDE; ++k) {
+            floatn of_row = (floatn)(0.0f);
+            for (int i = 0; i < SIDE; ++i) {
+                const floatn share = (floatn)(emission[(channel * SIDE + k) * SIDE + i]);
+                of_row += select_lanes(share, (floatn)(0.0f), (bits[k] & (1u << i)) != 0u);
+            }
+            seen += of_row;
+        }
+        float lanes[LANES];
+        store_lanes(seen, lanes);
+        for (int lane = 0; lane < LANES && lane < left; ++lane) to[lane * channels + channel] = fmin(lanes[lane], 1.0f);
+    }
+}
+
 // soft_shadow_union: the share of the light that each receiver sees past the micro-patches of `maps` occluder maps of one size.
 //
 //   coarse                             how much of the light's width a patch may hide that is not FULL
 //   nearest                            the greatest disparity on the maps
 //   texels, edges, texel_reach, parts [maps][height][width], reach, patches [maps][above]   as micro_patches.cl has them; parts: null where texels are whole
 //   light_rows [SIDE], light_samples   which samples shine, and how many: all, of a disc those inside
+//   emission [channels][SIDE][SIDE]    a texture's share of the whole light in each sample's cell, row by row from the light's lower edge; channels 0: none
+//   visibility [height][width], of a texture [height][width][channels]
 //   the rest                           as in soft_shadow_map.cl
 __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView occluders, const int maps, const int above, const float nearest, const float bias,
                                 const float precision, const int has_planes, const int lists, const float coarse, __global const float* restrict reach,
@@ -241,7 +263,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                                 __global const float* restrict texel_reach, __global const float4* restrict parts, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
                                 __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global const uint* restrict light_rows, const int light_samples,
-                                __global float* restrict visibility, __global uint* restrict evaluated, __global const volatile int* stop)
+                                const int channels, __global const float* restrict emission, __global float* restrict visibility, __global uint* restrict evaluated, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
     if (x >= receivers.stride || y >= receivers.rows) return;
@@ -291,7 +313,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     if (!has_limits) {
                         for (int row = 0; row < together; ++row) {
                             const int place = (y + top + row) * receivers.stride + x;
-                            own[top + row].limits = limits_with_planes(occluders, bias, precision, has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
+                            own[top + row].limits = limits_with_planes(occluders, bias, receiver_precisions(receivers, precision, own[top + row].d), has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
                                                                  load_lanes((has_planes ? slope_eta : d) + place), own[top + row].xi, own[top + row].eta, own[top + row].d);
                         }
                         has_limits = true;
@@ -337,6 +359,10 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         }
 
         for (int row = top; row < top + together && y + row < receivers.height; ++row) {
+            if (channels > 0) {
+                write_textured(visibility + ((y + row) * receivers.width + x) * channels, bits[row - top], channels, emission, receivers.width - x);
+                continue;
+            }
             const uintn hidden = samples_set(bits[row - top]);
             write_visibility(visibility + (y + row) * receivers.width + x, convert_floatn((uintn)(SIDE * SIDE) - hidden) * (1.0f / light_samples), receivers.width - x, 0);
         }

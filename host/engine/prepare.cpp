@@ -254,6 +254,18 @@ PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechniq
 
 } // namespace
 
+namespace {
+
+std::string takers_of_textures()
+{
+    std::vector<std::string> kinds;
+    for (const TechniqueRow& row : technique_table())
+        if (row.textured_lights) kinds.emplace_back(row.kind);
+    return joined(kinds);
+}
+
+} // namespace
+
 void check_light(const Light& light, const Technique& technique)
 {
     const TechniqueRow& row = row_of(kind_of(technique));
@@ -266,8 +278,7 @@ void check_light(const Light& light, const Technique& technique)
     }
     const auto* rectangle = std::get_if<RectangleLight>(&light);
     if (rectangle && (rectangle->emission || !rectangle->frames.empty()) && !row.textured_lights)
-        throw Error::at(ErrorCode::unsupported, "light.emission", std::string(row.kind) + " cannot take a textured light",
-                        "ray_traced can");
+        throw Error::at(ErrorCode::unsupported, "light.emission", std::string(row.kind) + " cannot take a textured light", "expected one of " + takers_of_textures());
 }
 
 double work_ms(const std::vector<Stage>& stages)

@@ -216,7 +216,7 @@ void shade_occlusion_texture(opencl::Work& work, const PreparedOcclusionTexture&
     nothing.first = 1;
     const auto launch = [&](const OcclusionLight& light, const auto& planes, const auto& levels, const auto& data) {
         work.launch(prepared.program, "occlusion_texture", {width / lanes, height}, {lanes == 1 ? std::size_t{64} : std::size_t{4}, 1},
-                    width * height * 16, view, light, size, planes, levels, data, receivers.xi, receivers.eta, receivers.d, visibility, work.stop());
+                    width * height * 16, view, static_cast<float>(receivers.precision), light, size, planes, levels, data, receivers.xi, receivers.eta, receivers.d, visibility, work.stop());
     };
     if (prepared.parts.empty()) launch(nothing, cl::Buffer(), cl::Buffer(), cl::Buffer());
     for (const PreparedOcclusionTexture::Part& part : prepared.parts) launch(part.light, part.planes, part.levels, part.data);

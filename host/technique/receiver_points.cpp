@@ -1,5 +1,7 @@
 #include "technique/receiver_points.hpp"
 
+#include <cmath>
+
 namespace penumbra {
 namespace {
 
@@ -9,7 +11,7 @@ int padded(int size, int multiple) { return (size + multiple - 1) / multiple * m
 
 opencl::Specialisation receivers_program() { return {"receivers.cl", {{"TILE_ROWS", std::to_string(tile_rows)}}}; }
 
-ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view)
+ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view, float reach)
 {
     ReceiverView view{};
 
@@ -34,6 +36,7 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
     view.per_light_y = static_cast<float>(1 / light_view.half_extent.y);
     view.camera_orthographic = camera.orthographic;
     view.light_orthographic = light_view.orthographic;
+    view.light_reach = reach;
     view.width = width;
     view.height = height;
     view.stride = padded(width, TILE_WIDTH);
@@ -43,10 +46,19 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
 
 namespace {
 
+// An orthographic view says nothing of what lies beside its middle: the whole width counts as distance.
+ReceiverView with_precision(ReceiverView view, double precision)
+{
+    const auto& m = view.light_from_camera;
+    const float beside = view.light_orthographic ? std::hypot(1 / view.per_light_x, 1 / view.per_light_y) : 0.F;
+    view.off = (static_cast<float>(precision) + 4 * 0x1p-24F) * (std::hypot(m[3], m[7], m[11]) + beside);
+    return view;
+}
+
 ReceiverPoints room_for_points(opencl::Work& work, const ReceiverView& view, double precision)
 {
     const std::size_t count = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.rows);
-    return {.view = view,
+    return {.view = with_precision(view, precision),
             .precision = precision,
             .xi = work.buffer<float>(count, "receivers' xi"),
             .eta = work.buffer<float>(count, "receivers' eta"),

@@ -91,7 +91,7 @@ bool add_back(opencl::Work& work, const OccluderDepth& depth, std::size_t number
 }
 
 // The maps of a union: front and back, or entries and exits in turn, and the back for what lies behind them.
-PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepared, const OccluderDepth& depth, MapSize from, MapSize size)
+PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepared, const OccluderDepth& depth, MapSize from, MapSize size, const Image* emission)
 {
     const Sides sides = prepared.settings.sides;
     Shown maps = sides == Sides::back ? Shown{} : surfaces_in_order(depth, sides == Sides::both);
@@ -110,7 +110,8 @@ PreparedUnion united_maps(opencl::Work& work, const PreparedSoftShadowMap& prepa
                           .from = from,
                           .size = size,
                           .precision = prepared.precision,
-                          .shape = depth.light.shape},
+                          .shape = depth.light.shape,
+                          .emission = emission},
                          prepared.view);
 }
 
@@ -143,7 +144,7 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
 void shade_estimated(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& points, const cl::Buffer& visibility, Shaded& shaded)
 {
     if (shaded.estimated)
-        shaded.estimated(estimate_by_sample(work, points, prepared.program, 1, projections, [&](const ReceiverPoints& some, const cl::Buffer& to, ShadeCounts& counts) {
+        shaded.estimated(estimate_by_sample(work, points, prepared.program, std::max(prepared.united.channels, 1), projections, [&](const ReceiverPoints& some, const cl::Buffer& to, ShadeCounts& counts) {
             shade_soft_shadow_map(work, prepared, some, to, &counts);
         }));
     shade_soft_shadow_map(work, prepared, points, visibility, shaded.counts);
@@ -154,13 +155,24 @@ void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, 
 {
     const int side = prepared.settings.project_resolution;
     const DepthMap from_light = receivers.from_light(side);
-    const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program);
+    const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program, prepared.reach);
     const auto light_mask = work.buffer<float>(from_light.depth.size(), "light-space mask");
     work.stage("shade");
     shade_estimated(work, prepared, lit_points, light_mask.memory(), shaded);
-    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    const ReceiverPoints points = points_of(work, receivers, prepared.program, prepared.reach);
     work.stage("project");
     sample_mask(work, points, light_mask.memory(), side, side, shaded.visibility, prepared.program);
+}
+
+// What only a union takes, or not together.
+void check_light(const LightFrame& light, const Image* emission, const SoftShadowMap& settings)
+{
+    const bool sum = settings.visibility == PatchVisibility::sum;
+    if (sum && light.shape == LightShape::disc)
+        throw Error::at(ErrorCode::invalid_input, "technique.visibility", light.directional ? "is sum and the light directional" : "is sum and the light a sphere",
+                        light.directional ? "expected union" : "expected union, or a rectangle of the same area: half-edges of 0.886 times the radius");
+    if (sum && emission) throw Error::at(ErrorCode::invalid_input, "technique.visibility", "is sum and the light textured", "expected union");
+    if (settings.project && emission) throw Error::at(ErrorCode::invalid_input, "technique.project", "is true and the light textured", "expected false");
 }
 
 // As published.
@@ -201,8 +213,8 @@ TechniqueRow row(const SoftShadowMap&)
                  integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
                                 "side of the light's-view mask with project"),
                  tolerance_key<S>()},
-        .lights = {"rectangle", "sphere", "point"},
-        .textured_lights = false,
+        .lights = {"rectangle", "sphere", "point", "directional"},
+        .textured_lights = true,
         .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
                   "(or objects)",
         .defaults = SoftShadowMap{}};
@@ -215,23 +227,24 @@ void check_together(const SoftShadowMap& settings)
                         "expected visibility sum: a union sums nothing up");
 }
 
-PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings)
+PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& given, const SoftShadowMap& settings, const Image* emission)
 {
     check_together(settings);
-    if (settings.visibility == PatchVisibility::sum && depth.light.shape == LightShape::disc)
-        throw Error::at(ErrorCode::invalid_input, "technique.visibility", "is sum and the light a sphere",
-                        "expected union, or a rectangle of the same area: half-edges of 0.886 times the radius");
+    check_light(given.light, emission, settings);
+    const EndlessDepth endless = endless_depth(work, given, program(settings, work.context().quirks().lanes));
+    const OccluderDepth& depth = endless.depth;
     const MapSize from{depth.width, depth.height};
     const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,
                                    .program = program(settings, work.context().quirks().lanes),
-                                   .view = occluder_view(depth.light, depth.camera, size),
+                                   .view = occluder_view(depth.light, depth.camera, size, endless.reach),
                                    .precision = depth.precision,
+                                   .reach = endless.reach,
                                    .nearest = 0,
                                    .sides = {},
                                    .united = {}};
     if (settings.visibility == PatchVisibility::united) {
-        prepared.united = united_maps(work, prepared, depth, from, size);
+        prepared.united = united_maps(work, prepared, depth, from, size, emission);
         prepared.nearest = prepared.united.nearest;
         return prepared;
     }
@@ -298,9 +311,20 @@ PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const 
     findings.view = casting.depth.camera;
     const DeviceDepth maps = on_device(work, casting, wanted.front, wanted.back, wanted.layers);
     work.stage("prepare");
-    PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, maps.depth, settings);
+    PreparedSoftShadowMap prepared = prepare_soft_shadow_map(work, maps.depth, settings, emission_of(casting.light));
+    findings.channels = std::max(prepared.united.channels, 1);
     if (prepared.nearest == 0) findings.warnings.emplace_back(empty_map);
     return prepared;
+}
+
+PreparedSoftShadowMap with_emission(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Light& light)
+{
+    const Image* const emission = emission_of(light);
+    check_light(light_frame(light), emission, prepared.settings);
+    work.stage("prepare");
+    PreparedSoftShadowMap other = prepared;
+    set_emission(work, emission, other.united);
+    return other;
 }
 
 void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
@@ -309,7 +333,7 @@ void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Rece
         shade_projected(work, prepared, receivers, shaded);
         return;
     }
-    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program, prepared.reach);
     work.stage("shade");
     shade_estimated(work, prepared, points, shaded.visibility, shaded);
 }

@@ -21,14 +21,15 @@ struct PreparedSoftShadowMap {
     opencl::Specialisation program;
     OccluderView view{};
     double precision = 0;
+    float reach = 0;   // of a directional light (ReceiverView::light_reach)
     float nearest = 0; // greatest disparity of any side; 0: nothing casts
     std::vector<Side> sides; // of the sum
     PreparedUnion united;    // of the union
 };
 
-PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings);
+PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings, const Image* emission = nullptr);
 
-// Writes visibility, receivers.view.height x receivers.view.width. With `counts` it waits for the device to fill them in.
+// Writes visibility, receivers.view.height x receivers.view.width, of a textured light with its channels. With `counts` it waits for the device to fill them in.
 void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& receivers,
                            const cl::Buffer& visibility, ShadeCounts* counts);
 
@@ -40,6 +41,7 @@ void sample_mask(opencl::Work& work, const ReceiverPoints& receivers, const cl::
 TechniqueRow row(const SoftShadowMap&);
 Needs needs(const SoftShadowMap& settings);
 PreparedSoftShadowMap prepare(opencl::Work& work, const Casting& casting, const SoftShadowMap& settings, Findings& findings);
+PreparedSoftShadowMap with_emission(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Light& light);
 void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Receiving& receivers, Shaded& shaded);
 std::vector<WorkAmount> work(const SoftShadowMap& settings, const MaskShape& shape);
 std::vector<opencl::Specialisation> specialisations(const SoftShadowMap& settings, int lanes);

@@ -15,6 +15,7 @@ namespace {
 // How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance. Measured
 // (docs/tolerance.md): without such patches the largest differences are the same.
 constexpr double coarse_per_tolerance = 1;
+constexpr int most_emission_texels = 32 * LIGHT_SIDE; // an axis, of a texture: what is larger is averaged
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height); }
@@ -143,6 +144,25 @@ bool shows_more(opencl::Work& work, const cl::Buffer& depth, std::span<const cl:
     return work.read(some).front() != 0;
 }
 
+void set_emission(opencl::Work& work, const Image* emission, PreparedUnion& prepared)
+{
+    prepared.channels = emission ? emission->channels : 0;
+    // The program wants a buffer.
+    std::vector<float> shares(static_cast<std::size_t>(std::max(prepared.channels, 1)) * LIGHT_SIDE * LIGHT_SIDE);
+    if (emission) {
+        const EmissionSums sums = emission_sums(emission, most_emission_texels);
+        const EmissionPart whole = emission_part(sums, 0, 0, 1);
+        for (std::size_t k = 0; k < LIGHT_SIDE; ++k)
+            for (std::size_t i = 0; i < LIGHT_SIDE; ++i) {
+                const auto middle = [](std::size_t cell) { return (2. * static_cast<double>(cell) + 1) / LIGHT_SIDE - 1; };
+                const EmissionPart cell = emission_part(sums, middle(i), middle(k), 1. / LIGHT_SIDE);
+                for (std::size_t c = 0; c < static_cast<std::size_t>(prepared.channels); ++c)
+                    shares[(c * LIGHT_SIDE + k) * LIGHT_SIDE + i] = static_cast<float>(cell.light[c] / whole.light[c]);
+            }
+    }
+    prepared.emission = work.upload(std::span<const float>(shares), "a texture's share of each sample");
+}
+
 PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view)
 {
     const opencl::Specialisation program = union_program(work.context().quirks().lanes);
@@ -150,6 +170,7 @@ PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const Occ
     const LightRows& rows = light_rows(maps.shape);
     prepared.light_rows = work.lend(std::span<const cl_uint>(rows), "samples of the light");
     for (const cl_uint row : rows) prepared.light_samples += std::popcount(row);
+    set_emission(work, maps.emission, prepared);
     add_texels(work, maps, view, program, prepared);
     add_patches(work, maps, view, program, prepared);
     return prepared;
@@ -164,7 +185,7 @@ void shade_union(opencl::Work& work, const PreparedUnion& prepared, const Occlud
                 static_cast<cl_int>(prepared.above), prepared.nearest, static_cast<float>(shading.bias), static_cast<float>(std::max(shading.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && lanes > 1), static_cast<float>(coarse_per_tolerance * shading.tolerance), prepared.reach,
                 prepared.patches, prepared.texels, prepared.edges, prepared.texel_reach, prepared.parts, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, prepared.light_rows,
-                static_cast<cl_int>(prepared.light_samples), visibility, evaluated, work.stop());
+                static_cast<cl_int>(prepared.light_samples), static_cast<cl_int>(prepared.channels), prepared.emission, visibility, evaluated, work.stop());
 }
 
 } // namespace penumbra

@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "technique/emission.hpp"
 #include "technique/occluder_maps.hpp"
 #include "technique/receiver_points.hpp"
 
@@ -17,6 +18,8 @@ struct PreparedUnion {
     opencl::Buffer<MicroPatch> patches;
     opencl::Buffer<cl_uint> light_rows; // which samples of the light shine
     int light_samples = 0;
+    opencl::Buffer<float> emission; // of a texture [channels][LIGHT_SIDE][LIGHT_SIDE]: what each sample's cell is of the whole light
+    int channels = 0;               // of the texture; 0: none
     int maps = 0;
     std::size_t above = 0; // patches of a map
     float nearest = 0;     // greatest disparity of all; 0: nothing casts
@@ -34,12 +37,16 @@ struct UnionMaps {
     MapSize from, size;
     double precision; // relative, of the depths
     LightShape shape;
+    const Image* emission; // null: none
 };
 
 opencl::Specialisation union_program(int lanes);
 
 // Whether a map shows something that none of the others does, `count` depths each.
 bool shows_more(opencl::Work& work, const cl::Buffer& depth, std::span<const cl::Buffer> others, std::size_t count);
+
+// Sets the samples' shares of a light with that texture; null: none.
+void set_emission(opencl::Work& work, const Image* emission, PreparedUnion& prepared);
 
 PreparedUnion prepare_union(opencl::Work& work, const UnionMaps& maps, const OccluderView& view);
 

@@ -29,12 +29,6 @@ constexpr Names<2> shape_names{"rectangle", "disc"}; // of LightShape
 static_assert(static_cast<int>(Overlap::sum) == OVERLAP_SUM && static_cast<int>(Overlap::max) == OVERLAP_MAX);
 static_assert(static_cast<int>(Overlap::half_min) == OVERLAP_HALF_MIN && static_cast<int>(Overlap::product) == OVERLAP_PRODUCT);
 
-const Image* emission_of(const Light& light)
-{
-    const auto* rectangle = std::get_if<RectangleLight>(&light);
-    return rectangle && rectangle->emission ? &*rectangle->emission : nullptr;
-}
-
 void check_settings(const Light& light, const SoftShadowVolume& settings)
 {
     check_together(settings);
@@ -103,6 +97,7 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
             .bias_x = static_cast<float>(bias * casters.texel.x * part.half.z / part.half.x),
             .bias_y = static_cast<float>(bias * casters.texel.y * part.half.z / part.half.y),
             .precision = 0,
+            .off = 0,
             .position_error = 0,
             .share = {static_cast<float>(part.share), static_cast<float>(part.share), static_cast<float>(part.share)},
             .sheets = sheets,
@@ -215,7 +210,7 @@ void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolu
     const LightFrame frame = light_frame(light);
     const int table = prepared.settings.table, splits = static_cast<int>(std::lround(std::sqrt(prepared.parts.size())));
     const EmissionSums emission = emission_sums(emission_of(light), 2 * table);
-    const EmissionPart whole = emission_part(emission, light_parts(frame, 1).front(), 1);
+    const EmissionPart whole = emission_part(emission, 0, 0, 1);
     prepared.channels = emission.channels;
     prepared.program = program(work.context().quirks().lanes, frame.shape, prepared.settings, emission.channels);
     const std::vector<LightPart> parts = light_parts(frame, splits);
@@ -224,7 +219,7 @@ void set_emission(opencl::Work& work, const Light& light, PreparedSoftShadowVolu
         require_memory(4 * std::pow(table, 4) * emission.channels * static_cast<double>(parts.size()),
                        std::to_string(parts.size()) + " coverage tables (technique.table, light_splits)");
     for (std::size_t i = 0; i < parts.size(); ++i) {
-        const EmissionPart lit = emission_part(emission, parts[i], splits);
+        const EmissionPart lit = emission_part(emission, parts[i].centre_x / splits, parts[i].centre_y / splits, 1.0 / splits);
         prepared.parts[i].coverage = coverage_table(work, prepared.program, emission, lit, table);
         for (std::size_t c = 0; c < static_cast<std::size_t>(emission.channels); ++c)
             prepared.parts[i].light.share[c] = static_cast<float>(lit.light[c] / whole.light[c]);
@@ -413,11 +408,12 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
     const auto width = static_cast<std::size_t>(view.stride), height = static_cast<std::size_t>(view.rows);
     const std::array<std::size_t, 2> group =
         lanes == 1 ? std::array<std::size_t, 2>{TILE_WIDTH, tile_rows} : std::array<std::size_t, 2>{1, 1};
-    // Of coordinates in the camera's frame, moved by the camera's place: a few roundings of it.
-    const float place = 0x1p-22F * std::max({std::abs(view.light_from_camera[3]), std::abs(view.light_from_camera[7]),
-                                             std::abs(view.light_from_camera[11])});
+    // Of coordinates in the camera's frame, moved by the camera's place: a few roundings of it, and what the depth there is off by.
+    const float place = (0x1p-22F + 2 * static_cast<float>(receivers.precision)) *
+                        std::max({std::abs(view.light_from_camera[3]), std::abs(view.light_from_camera[7]), std::abs(view.light_from_camera[11])});
     const auto seen_by = [&](WedgeLight light) {
         light.precision = static_cast<float>(receivers.precision);
+        light.off = view.off / light.scale_d;
         light.position_error = place * std::max(light.scale_x, light.scale_y) / light.scale_d;
         return light;
     };

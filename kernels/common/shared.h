@@ -34,6 +34,8 @@ typedef struct {
     float off_x, off_y;                     // from the viewing axis to the image's middle, right and up; in the same measure
     float per_light_x, per_light_y;         // 1 over the light's own view's tangents, or over its half extents if orthographic
     int camera_orthographic, light_orthographic;
+    float light_reach;                      // of a directional light: disparity is 2 - z / light_reach (occluders.cl); 0: 1 / z
+    float off;                              // of a receiver's depth in light space, scene units, half of it: what the camera's distance from the light adds to its error
     int width, height;                      // of the receiver map
     int stride, rows;                       // of the padded lists of receivers
 } ReceiverView;
@@ -92,6 +94,7 @@ typedef struct {
     float reach_x, reach_y;            // of the light in half extents: 1, or that of its bounding sphere for loose wedges
     float bias_x, bias_y;              // self-shadow: a caster's disparity steps count for this far in x and y; 0 for triangles
     float precision;                   // of receiver depth, relative
+    float off;                         // ReceiverView::off, a unit of disparity
     float position_error;              // of receivers in light space beside their own rounding, in half extents
     float share[3];                    // what the part's visibility counts for in the whole light's, for each channel
     int sheets;

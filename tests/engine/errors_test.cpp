@@ -94,11 +94,11 @@ TEST(EngineErrors, LightsThatATechniqueCannotTake)
     expect_error(prepare_error(sphere, o, SoftShadowMap{.visibility = PatchVisibility::sum, .sides = Sides::front}), ErrorCode::invalid_input,
                  {"technique.visibility", "sphere", "union", "0.886"});
     const DirectionalLight sun{.direction = {0, 0, -1}, .angular_diameter_deg = 0.5, .up = {}};
-    expect_error(prepare_error(sun, o, front), ErrorCode::unsupported, {"light.kind", "directional"});
+    expect_error(prepare_error(sun, o, SoftShadowVolume{}), ErrorCode::unsupported, {"light.kind", "directional", "soft_shadow_volume"});
     RectangleLight textured = rectangle_light(1, 1);
     textured.emission = Image{.width = 1, .height = 1, .channels = 1, .pixels = {1}};
-    expect_error(prepare_error(textured, o, front), ErrorCode::unsupported, {"light.emission", "soft_shadow_map"});
-    expect_error(prepare_error(textured, o, ShadowMap{}), ErrorCode::unsupported, {"light.emission", "shadow_map", "ray_traced"});
+    expect_error(prepare_error(textured, o, OcclusionTexture{}), ErrorCode::unsupported, {"light.emission", "occlusion_texture"});
+    expect_error(prepare_error(textured, o, ShadowMap{}), ErrorCode::unsupported, {"light.emission", "shadow_map", "soft_shadow_map, soft_shadow_volume", "ray_traced"});
     expect_error(prepare_error(RectangleLight{.center = {0, 0, 0}, .half_u = {1, 0, 0}, .half_v = {1, 1, 0}, .emission = {}}, o, front),
                  ErrorCode::invalid_input, {"light.half_v"});
 

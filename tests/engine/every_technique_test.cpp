@@ -75,6 +75,29 @@ TEST(EveryTechnique, TakesTheLightsOfItsRowAndRefusesTheOthersByName)
         }
 }
 
+// Depth is known to a share of the distance from the camera, and rounding is one of the camera's place: with a camera far away both are more than the few units
+// in the last place of the receiver's distance from the light.
+TEST(EveryTechnique, LeavesALitPlaneThatCastsAloneFromHoweverFarItIsSeen)
+{
+    const Engine engine;
+    for (const TechniqueRow& row : technique_table())
+        for (const Light& light : lights)
+            for (const double distance : {6., 60., 600., 6000.}) {
+                const std::string kind = kind_of(light);
+                if (!takes(row, kind)) continue;
+                Scene scene = plate_over_floor(light);
+                scene.objects.erase(scene.objects.begin());
+                scene.objects.front().casts = true;
+                scene.receivers.camera = PinholeCamera{.frame = {.origin = {0, distance * 0.8, distance * 0.6}, .x = {1, 0, 0}, .y = {0, 0.6, -0.8}, .z = {0, 0.8, 0.6}},
+                                                       .tan_half_fov = {2 / distance, 2 / distance}};
+                // Every receiver by itself: a tolerance would see that nothing casts on any.
+                Technique technique = row.defaults;
+                for (const SettingKey& key : row.keys)
+                    if (key.name == "tolerance") key.set(technique, 0.);
+                EXPECT_GE(std::ranges::min(engine.mask(scene, technique).visibility.pixels), 0.999F) << row.kind << " under a " << kind << " from " << distance << " units";
+            }
+}
+
 TEST(EveryTechnique, WithEveryChoiceGivesVisibilityFromZeroToOne)
 {
     const Engine engine;

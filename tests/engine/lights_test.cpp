@@ -230,7 +230,7 @@ TEST(Lights, WhatDoesNotFitIsNamed)
                     named("b", RectangleLight{.center = {0, 6, 0}, .half_u = {1, 0, 0}, .half_v = {1, 0, 0}, .emission = {}})}),
           SoftShadowVolume{}, "lights[1].half_v: is not orthogonal");
     fails(scene_of({named("a", panel(0)), named("b", DirectionalLight{.direction = {0, -1, 0}, .angular_diameter_deg = 1, .up = {}})}),
-          SoftShadowMap{}, "lights[1].kind: soft_shadow_map cannot take a directional light");
+          SoftShadowVolume{}, "lights[1].kind: soft_shadow_volume cannot take a directional light");
     Scene own = scene_of(two);
     own.objects.erase(own.objects.begin());
     own.lights[0].occluders = occluders(light_view(), flat(8, 8, 2));

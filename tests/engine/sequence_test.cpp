@@ -217,9 +217,9 @@ TEST(Sequence, WhatTakesOneImageSaysSo)
         EXPECT_EQ(error.code(), ErrorCode::usage);
         EXPECT_TRUE(holds(error.what(), "light.emission: is a sequence of 3 images, expected one")) << error.what();
     }
-    const Error map = error_of([&] { engine().masks(scene, SoftShadowMap{}); });
+    const Error map = error_of([&] { engine().masks(scene, ShadowMap{}); });
     EXPECT_EQ(map.code(), ErrorCode::unsupported);
-    EXPECT_TRUE(holds(map.what(), "light.emission: soft_shadow_map cannot take a textured light")) << map.what();
+    EXPECT_TRUE(holds(map.what(), "light.emission: shadow_map cannot take a textured light")) << map.what();
     Scene both = scene;
     std::get<RectangleLight>(both.light).emission = frame_of(1, 1);
     EXPECT_TRUE(holds(error_of([&] { engine().masks(both, by_table()); }).what(), "is an image and a sequence"));

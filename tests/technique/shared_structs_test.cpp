@@ -41,7 +41,7 @@ TEST(SharedStructs, ReceiverView)
 {
     const std::vector<std::string> members = {
         "light_from_camera",  "pixel_x", "pixel_y", "off_x", "off_y", "per_light_x", "per_light_y", "camera_orthographic",
-        "light_orthographic", "width",   "height",  "stride",      "rows"};
+        "light_orthographic", "light_reach", "off", "width", "height", "stride", "rows"};
     const std::vector<cl_int> host = {sizeof(ReceiverView),
                                       HERE(ReceiverView, light_from_camera),
                                       HERE(ReceiverView, pixel_x),
@@ -52,13 +52,15 @@ TEST(SharedStructs, ReceiverView)
                                       HERE(ReceiverView, per_light_y),
                                       HERE(ReceiverView, camera_orthographic),
                                       HERE(ReceiverView, light_orthographic),
+                                      HERE(ReceiverView, light_reach),
+                                      HERE(ReceiverView, off),
                                       HERE(ReceiverView, width),
                                       HERE(ReceiverView, height),
                                       HERE(ReceiverView, stride),
                                       HERE(ReceiverView, rows)};
     EXPECT_EQ(on_device(writes("ReceiverView", members), host.size()), host);
-    // Every member is listed: 12 + 6 floats and 6 ints.
-    EXPECT_EQ(sizeof(ReceiverView), 24 * 4u);
+    // Every member is listed: 12 + 8 floats and 6 ints.
+    EXPECT_EQ(sizeof(ReceiverView), 26 * 4u);
 }
 
 TEST(SharedStructs, OccluderView)
@@ -85,17 +87,17 @@ TEST(SharedStructs, Sheet)
 TEST(SharedStructs, WedgeLight)
 {
     const std::vector<std::string> members = {"scale_x", "scale_y", "scale_d", "centre_x",  "centre_y",       "reach_x",
-                                              "reach_y", "bias_x",  "bias_y",  "precision", "position_error", "share",
+                                              "reach_y", "bias_x",  "bias_y",  "precision", "off", "position_error", "share",
                                               "sheets",  "overlap", "culling", "first"};
     const std::vector<cl_int> host = {sizeof(WedgeLight),        HERE(WedgeLight, scale_x),   HERE(WedgeLight, scale_y),
                                       HERE(WedgeLight, scale_d), HERE(WedgeLight, centre_x),  HERE(WedgeLight, centre_y),
                                       HERE(WedgeLight, reach_x), HERE(WedgeLight, reach_y),   HERE(WedgeLight, bias_x),
-                                      HERE(WedgeLight, bias_y),  HERE(WedgeLight, precision), HERE(WedgeLight, position_error),
+                                      HERE(WedgeLight, bias_y),  HERE(WedgeLight, precision), HERE(WedgeLight, off), HERE(WedgeLight, position_error),
                                       HERE(WedgeLight, share),   HERE(WedgeLight, sheets),    HERE(WedgeLight, overlap),
                                       HERE(WedgeLight, culling), HERE(WedgeLight, first)};
     EXPECT_EQ(on_device(writes("WedgeLight", members), host.size()), host);
-    // Every member is listed: 11 floats, a share for each channel, 4 ints.
-    EXPECT_EQ(sizeof(WedgeLight), 11 * 4u + sizeof(WedgeLight::share) + 4 * 4u);
+    // Every member is listed: 12 floats, a share for each channel, 4 ints.
+    EXPECT_EQ(sizeof(WedgeLight), 12 * 4u + sizeof(WedgeLight::share) + 4 * 4u);
 }
 
 TEST(SharedStructs, SliceView)
