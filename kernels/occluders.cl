@@ -87,7 +87,7 @@ __kernel void slope_steps(const int2 size, const float precision, __global const
 // --- A directional light's maps -----------------
 //
 // Its view is orthographic: planes are linear in z there, as they are in 1 / z of a perspective. What compares disparities needs one that grows towards
-// the light, is positive and linear on planes: 2 - z / reach, with reach the greatest depth of all maps, so that the relative precision of depths holds for it.
+// the light, is positive and linear on planes: 2 - z / reach, with reach at least the greatest depth of all maps, so that the relative precision of depths holds for it.
 
 // greatest_depths: the greatest depth of a map and of those before, in as many parts as there are work-items.
 __kernel void greatest_depths(const int count, __global const float* restrict depth, __global float* restrict greatest)

@@ -82,7 +82,8 @@ EndlessDepth endless_depth(opencl::Work& work, const OccluderDepth& depth, const
     const auto greatest = work.upload(std::span<const float>(std::vector<float>(parts, 0.F)), "greatest depths");
     for (const auto& [map, samples] : maps) work.launch(program, "greatest_depths", {parts, 1}, {64, 1}, samples * 4, static_cast<cl_int>(samples), *map, greatest);
     for (const float most : work.read(greatest)) endless.reach = std::max(endless.reach, most);
-    if (endless.reach == 0) endless.reach = 1; // nothing casts
+    // Not less than the view is wide: what lies close to its plane would leave all other receivers thousands of disparities behind it.
+    endless.reach = std::max(endless.reach, static_cast<float>(depth.camera.half_extent.length()));
     for (const auto& [map, samples] : maps) {
         endless.made.push_back(work.buffer<float>(samples, "depths of a directional light"));
         work.launch(program, "depths_of_endless", {samples, 1}, {256, 1}, samples * 8, static_cast<cl_int>(samples), endless.reach, *map, endless.made.back());
