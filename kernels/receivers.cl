@@ -18,8 +18,7 @@ inline void store_receiver(const ReceiverView view, const int at, const int ther
     // Nearer than the least normal number counts as at the light: one over it would be beyond binary32.
     const bool before = there && lz >= 0x1p-126f;
 
-    // The farthest receivers stay finite.
-    const float disparity = view.light_reach > 0.0f ? fmax(2.0f - lz / view.light_reach, -0x1p60f) : 1.0f / lz;
+    const float disparity = 1.0f / lz;
     const float scale = view.light_orthographic ? 1.0f : disparity;
     xi[at] = before ? lx * scale * view.per_light_x : 0.0f;
     eta[at] = before ? ly * scale * view.per_light_y : 0.0f;
@@ -62,8 +61,7 @@ __kernel void receivers_from_points(const ReceiverView view, __global const floa
 }
 
 // A receiver's own plane as the light's view shows it: how its disparity changes with xi and with eta. A plane n . p = c has
-// d = (n.x tx xi + n.y ty eta + n.z) / c there, with tx, ty the view's tangents; of a directional light, whose d is 2 - z / reach and tx, ty lengths,
-// d = 2 + (n.x tx xi + n.y ty eta - c) / (n.z reach).
+// d = (n.x tx xi + n.y ty eta + n.z) / c there, with tx, ty the view's tangents.
 //
 //   n            its surface's normal, towards the camera, in the camera's coordinates; 0: not known
 //   slope_xi     NO_PLANE: not known, or the light's centre does not see that side of the plane
@@ -74,12 +72,10 @@ inline void store_plane(const ReceiverView view, const int at, const int there, 
     const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
     const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
     // n . p over the receiver's depth: negative where the light's centre is before the plane.
-    const bool endless = view.light_reach > 0.0f;
-    const float facing = endless ? nz : nx * xi[at] + ny * eta[at] + nz;
-    const bool known = there && d[at] != NO_RECEIVER && (endless || !view.light_orthographic) && facing < -1e-4f;
-    const float per_facing = (endless ? 1.0f / view.light_reach : d[at]) / facing;
-    slope_xi[at] = known ? nx * per_facing : NO_PLANE;
-    slope_eta[at] = known ? ny * per_facing : 0.0f;
+    const float facing = nx * xi[at] + ny * eta[at] + nz;
+    const bool known = there && d[at] != NO_RECEIVER && !view.light_orthographic && facing < -1e-4f;
+    slope_xi[at] = known ? nx * d[at] / facing : NO_PLANE;
+    slope_eta[at] = known ? ny * d[at] / facing : 0.0f;
 }
 
 // receiver_planes: store_plane of every receiver.
