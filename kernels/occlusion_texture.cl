@@ -82,7 +82,7 @@ __kernel void occlusion_texture(const ReceiverView view, const float precision, 
     for (int layer = 0; layer < MOST_LAYERS; ++layer) of_layer[layer] = zero;
     for (int i = 0; i < light.planes; ++i) {
         const OcclusionPlane plane = planes[i];
-        const floatn weight = saturate((p.z - beyond - plane.fade_from) * plane.per_fade);
+        const floatn behind = p.z - plane.fade_from, weight = select_lanes(zero, saturate(behind * plane.per_fade), behind > beyond);
         const intn counts = there & (weight > zero);
         if (NONE(counts)) continue;
         const floatn by = select_lanes(zero, weight * hidden(light, plane, i, p, size, levels, data), counts);
