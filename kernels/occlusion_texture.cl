@@ -75,7 +75,7 @@ __kernel void occlusion_texture(const ReceiverView view, const float precision, 
     const intn there = load_lanes(d + at) != (floatn)(NO_RECEIVER);
 
     // A slice hides from receivers that lie behind it by more than their depth may be off.
-    const floatn beyond = fma((floatn)(8.0f * 0x1p-24f + 2.0f * precision), fabs(p.z), (floatn)(2.0f * view.off));
+    const floatn beyond = fma((floatn)(8.0f * 0x1p-24f + 2.0f * precision), fabs(p.z), (floatn)(2.0f * view.depth_error));
 
     // Product, sum and greatest of all planes; if layered, the sum within each layer (of what a column holds, its first few filled slices).
     floatn lit = one, sum = zero, greatest = zero, of_layer[MOST_LAYERS];

@@ -359,7 +359,7 @@ inline Area area_of(const float8 box, const WedgeLight light)
                        fmax(fma(-light.centre_y, d0, y1), fma(-light.centre_y, d1, y1)),
                        d0,
                        d1,
-                       0x1p-22f + 2.0f * (light.precision + light.off * d1),
+                       0x1p-22f + 2.0f * (light.precision + light.depth_error * d1),
                        light.position_error,
                        light.bias_x,
                        light.bias_y,

@@ -114,7 +114,7 @@ __attribute__((always_inline)) inline intn behind_triangle(const Triangle t, con
     const floatn place = fma((floatn)(light.position_error + t.from_whole), p.d, 0x1p-22f * (fabs(p.tx) + fabs(p.ty)));
     const floatn rounding = 0x1p-22f * (fabs(t.nx) * fabs(p.tx) + fabs(t.ny) * fabs(p.ty) + fabs(t.nz)) + (fabs(t.nx) + fabs(t.ny)) * place;
     const floatn own = fma((floatn)(0x1p-23f * t.moved), fabs(near), rounding);
-    const floatn limit = p.d + ((0x1p-22f + 2.0f * (light.precision + light.off * p.d)) * p.d + own + (fabs(t.nx) * light.bias_x + fabs(t.ny) * light.bias_y));
+    const floatn limit = p.d + ((0x1p-22f + 2.0f * (light.precision + light.depth_error * p.d)) * p.d + own + (fabs(t.nx) * light.bias_x + fabs(t.ny) * light.bias_y));
     const intn before = near > limit;
     if (NONE(before)) return before;
     const floatn ax = across(t.ax, t.az, p.tx), ay = across(t.ay, t.az, p.ty);

@@ -252,10 +252,6 @@ PreparedTechnique under_other_emission(opencl::Work& work, const PreparedTechniq
     return std::visit(call, before);
 }
 
-} // namespace
-
-namespace {
-
 std::string takers_of_textures()
 {
     std::vector<std::string> kinds;

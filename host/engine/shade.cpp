@@ -12,6 +12,7 @@
 #include "refine/coarse_to_fine.hpp"
 #include "scene/depth.hpp"
 #include "scene/parallel.hpp"
+#include "technique/emission.hpp"
 
 namespace penumbra {
 namespace {
@@ -34,12 +35,6 @@ Report report_of(const Prepared::State& state, int width, int height)
     report.warnings = state.warnings;
     report.notes = state.notes;
     return report;
-}
-
-bool has_emission(const Light& light)
-{
-    const auto* rectangle = std::get_if<RectangleLight>(&light);
-    return rectangle && rectangle->emission;
 }
 
 // A mask of a textured light has three channels, a grey texture's as well.
@@ -153,7 +148,7 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const DepthMap&
     if (!visibility) return std::move(shaded.image);
     work.stage("read back");
     Image image{.width = receivers.width, .height = receivers.height, .channels = state.channels, .pixels = work.read(visibility)};
-    if (has_emission(state.light) && state.channels == 1) make_grey(image);
+    if (emission_of(state.light) && state.channels == 1) make_grey(image);
     return image;
 }
 
@@ -283,7 +278,7 @@ std::vector<float> shade_on_device(opencl::Work& work, const Prepared::State& st
     shade_technique(work, state, listed, shaded);
     if (whole.normals) clip(work, state, listed, visibility.memory());
     std::vector<float> values = work.read(visibility);
-    if (!has_emission(state.light) || state.channels != 1) return values;
+    if (!emission_of(state.light) || state.channels != 1) return values;
     Image grey{.width = listed.width, .height = listed.height, .channels = 1, .pixels = std::move(values)};
     make_grey(grey);
     return std::move(grey.pixels);
@@ -320,7 +315,7 @@ Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade
         return values;
     };
     work.stage("choose receivers");
-    const int channels = has_emission(state.light) ? 3 : state.channels;
+    const int channels = emission_of(state.light) ? 3 : state.channels;
     CoarseToFine result = shade_coarse_to_fine(image, channels, {.tolerance = needs.tolerance, .proves_lit = state.proves_lit}, *state.field, shade_list);
     report.receivers = result.receivers;
     report.receivers_shaded = result.shaded;
@@ -392,7 +387,7 @@ void Engine::shade(const Prepared& prepared, const DeviceReceivers& receivers, c
 {
     const Prepared::State& state = prepared.state();
     if (const auto refused = device_buffers_of(state.technique).shade) throw *refused;
-    if (has_emission(state.light))
+    if (emission_of(state.light))
         throw Error(ErrorCode::unsupported, "a textured light's mask has three channels and cannot be shaded into a device buffer",
                     "shade a depth map in memory");
     check_device_buffer(receivers.depth, receivers.width, receivers.height, "receivers.depth");

@@ -50,7 +50,7 @@ ReceiverView with_precision(ReceiverView view, double precision)
 {
     const auto& m = view.light_from_camera;
     const float beside = view.light_orthographic ? std::hypot(1 / view.per_light_x, 1 / view.per_light_y) : 0.F;
-    view.off = (static_cast<float>(precision) + 4 * 0x1p-24F) * (std::hypot(m[3], m[7], m[11]) + beside);
+    view.depth_error = (static_cast<float>(precision) + 4 * 0x1p-24F) * (std::hypot(m[3], m[7], m[11]) + beside);
     return view;
 }
 

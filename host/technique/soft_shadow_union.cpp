@@ -15,7 +15,6 @@ namespace {
 // How much of the light's width a patch may hide that stands for smaller ones: so many times the tolerance. Measured
 // (docs/tolerance.md): without such patches the largest differences are the same.
 constexpr double coarse_per_tolerance = 1;
-constexpr int most_emission_texels = 32 * LIGHT_SIDE; // an axis, of a texture: what is larger is averaged
 constexpr int patch_levels = 6; // PATCH_LEVELS of soft_shadow_union.cl
 
 std::size_t count_of(MapSize size) { return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height); }
@@ -150,7 +149,7 @@ void set_emission(opencl::Work& work, const Image* emission, PreparedUnion& prep
     // The program wants a buffer.
     std::vector<float> shares(static_cast<std::size_t>(std::max(prepared.channels, 1)) * LIGHT_SIDE * LIGHT_SIDE);
     if (emission) {
-        const EmissionSums sums = emission_sums(emission, most_emission_texels);
+        const EmissionSums sums = emission_sums(emission, LIGHT_SIDE);
         const EmissionPart whole = emission_part(sums, 0, 0, 1);
         for (std::size_t k = 0; k < LIGHT_SIDE; ++k)
             for (std::size_t i = 0; i < LIGHT_SIDE; ++i) {

@@ -97,7 +97,7 @@ WedgeLight wedge_light(const LightFrame& light, const LightPart& part, const Cas
             .bias_x = static_cast<float>(bias * casters.texel.x * part.half.z / part.half.x),
             .bias_y = static_cast<float>(bias * casters.texel.y * part.half.z / part.half.y),
             .precision = 0,
-            .off = 0,
+            .depth_error = 0,
             .position_error = 0,
             .share = {static_cast<float>(part.share), static_cast<float>(part.share), static_cast<float>(part.share)},
             .sheets = sheets,
@@ -413,7 +413,7 @@ void shade_soft_shadow_volume(opencl::Work& work, const PreparedSoftShadowVolume
                         std::max({std::abs(view.light_from_camera[3]), std::abs(view.light_from_camera[7]), std::abs(view.light_from_camera[11])});
     const auto seen_by = [&](WedgeLight light) {
         light.precision = static_cast<float>(receivers.precision);
-        light.off = view.off / light.scale_d;
+        light.depth_error = view.depth_error / light.scale_d;
         light.position_error = place * std::max(light.scale_x, light.scale_y) / light.scale_d;
         return light;
     };

@@ -34,7 +34,7 @@ typedef struct {
     float off_x, off_y;                     // from the viewing axis to the image's middle, right and up; in the same measure
     float per_light_x, per_light_y;         // 1 over the light's own view's tangents, or over its half extents if orthographic
     int camera_orthographic, light_orthographic;
-    float off;                              // of a receiver's depth in light space, scene units, half of it: what the camera's distance from the light adds to its error
+    float depth_error;                      // scene units: by half as much as a receiver's distance from the light may be off for the camera's distance from there
     int width, height;                      // of the receiver map
     int stride, rows;                       // of the padded lists of receivers
 } ReceiverView;
@@ -93,7 +93,7 @@ typedef struct {
     float reach_x, reach_y;            // of the light in half extents: 1, or that of its bounding sphere for loose wedges
     float bias_x, bias_y;              // self-shadow: a caster's disparity steps count for this far in x and y; 0 for triangles
     float precision;                   // of receiver depth, relative
-    float off;                         // ReceiverView::off, a unit of disparity
+    float depth_error;                 // ReceiverView::depth_error, in the units of 1 / scale_d
     float position_error;              // of receivers in light space beside their own rounding, in half extents
     float share[3];                    // what the part's visibility counts for in the whole light's, for each channel
     int sheets;

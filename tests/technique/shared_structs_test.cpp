@@ -41,7 +41,7 @@ TEST(SharedStructs, ReceiverView)
 {
     const std::vector<std::string> members = {
         "light_from_camera",  "pixel_x", "pixel_y", "off_x", "off_y", "per_light_x", "per_light_y", "camera_orthographic",
-        "light_orthographic", "off", "width", "height", "stride", "rows"};
+        "light_orthographic", "depth_error", "width", "height", "stride", "rows"};
     const std::vector<cl_int> host = {sizeof(ReceiverView),
                                       HERE(ReceiverView, light_from_camera),
                                       HERE(ReceiverView, pixel_x),
@@ -52,7 +52,7 @@ TEST(SharedStructs, ReceiverView)
                                       HERE(ReceiverView, per_light_y),
                                       HERE(ReceiverView, camera_orthographic),
                                       HERE(ReceiverView, light_orthographic),
-                                      HERE(ReceiverView, off),
+                                      HERE(ReceiverView, depth_error),
                                       HERE(ReceiverView, width),
                                       HERE(ReceiverView, height),
                                       HERE(ReceiverView, stride),
@@ -86,12 +86,12 @@ TEST(SharedStructs, Sheet)
 TEST(SharedStructs, WedgeLight)
 {
     const std::vector<std::string> members = {"scale_x", "scale_y", "scale_d", "centre_x",  "centre_y",       "reach_x",
-                                              "reach_y", "bias_x",  "bias_y",  "precision", "off", "position_error", "share",
+                                              "reach_y", "bias_x",  "bias_y",  "precision", "depth_error", "position_error", "share",
                                               "sheets",  "overlap", "culling", "first"};
     const std::vector<cl_int> host = {sizeof(WedgeLight),        HERE(WedgeLight, scale_x),   HERE(WedgeLight, scale_y),
                                       HERE(WedgeLight, scale_d), HERE(WedgeLight, centre_x),  HERE(WedgeLight, centre_y),
                                       HERE(WedgeLight, reach_x), HERE(WedgeLight, reach_y),   HERE(WedgeLight, bias_x),
-                                      HERE(WedgeLight, bias_y),  HERE(WedgeLight, precision), HERE(WedgeLight, off), HERE(WedgeLight, position_error),
+                                      HERE(WedgeLight, bias_y),  HERE(WedgeLight, precision), HERE(WedgeLight, depth_error), HERE(WedgeLight, position_error),
                                       HERE(WedgeLight, share),   HERE(WedgeLight, sheets),    HERE(WedgeLight, overlap),
                                       HERE(WedgeLight, culling), HERE(WedgeLight, first)};
     EXPECT_EQ(on_device(writes("WedgeLight", members), host.size()), host);
