@@ -125,6 +125,7 @@ __kernel void disparities_of_map(const int count, __global const float* restrict
 typedef struct {
     int2 from, first, last;
     __global const float* disparities;
+    float2 middle; // of the texel, as the larger map has places
 } Samples;
 inline float sample_at(const Samples samples, const int i, const int j) { return samples.disparities[j * samples.from.x + i]; }
 
@@ -177,6 +178,23 @@ inline Surface surface_below(const Samples samples, const float limit, const flo
     return surface;
 }
 
+// A surface's step along one axis: the lesser of those to either side, so that no edge counts as one.
+inline float step_between(const float before, const float d, const float after)
+{
+    const float down = d - before, up = after - d;
+    return before > 0.0f && after > 0.0f && down * up > 0.0f ? (fabs(up) < fabs(down) ? up : down) : 0.0f;
+}
+
+// How much the disparity changes from the middle of a texel's samples to the texel's own: they differ where the larger map's size is not a multiple.
+inline float to_middle(const Samples samples)
+{
+    const float2 off = samples.middle - 0.5f * convert_float2(samples.first + samples.last);
+    if (off.x == 0.0f && off.y == 0.0f) return 0.0f;
+    const int2 at = samples.first, low = max(at - 1, (int2)(0)), high = min(at + 1, samples.from - 1);
+    const float d = sample_at(samples, at.x, at.y);
+    return off.x * step_between(sample_at(samples, low.x, at.y), d, sample_at(samples, high.x, at.y)) + off.y * step_between(sample_at(samples, at.x, low.y), d, sample_at(samples, at.x, high.y));
+}
+
 // The two nearest surfaces of a texel, each with what it covers of it. Means of different surfaces would be none of them, and without the second what lies
 // beside an edge would be lost.
 typedef struct {
@@ -210,7 +228,7 @@ inline Surfaces surfaces_of(const Samples samples, const float gap)
     Surface none = {0.0f, 0.0f, 0.0f, (float4)(0.0f)};
     Surfaces surfaces = {none, none};
     if (plain) {
-        surfaces.first.d = all / (wide.x * wide.y);
+        surfaces.first.d = all / (wide.x * wide.y) + to_middle(samples);
         surfaces.first.share = 1.0f;
     } else if (nearest > 0.0f) {
         surfaces.first = surface_below(samples, INFINITY, gap);
@@ -238,7 +256,8 @@ __kernel void surfaces_of_texels(const int2 from, __global const float* restrict
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= size.x || y >= size.y) return;
     const Samples samples = {from, (int2)((2 * x * from.x + size.x) / (2 * size.x), (2 * y * from.y + size.y) / (2 * size.y)),
-                             (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y)), disparities};
+                             (int2)((2 * (x + 1) * from.x + size.x) / (2 * size.x), (2 * (y + 1) * from.y + size.y) / (2 * size.y)), disparities,
+                             (float2)((x + 0.5f) * from.x / size.x, (y + 0.5f) * from.y / size.y)};
     const Surfaces surfaces = surfaces_of(samples, gap);
     const int at = y * size.x + x;
     store(surfaces.first, texels + begin + at, parts + begin + at);
@@ -261,7 +280,7 @@ __kernel void surfaces_of_samples(const int2 size, const int begin, const int se
     Surface none = {0.0f, 0.0f, 0.0f, (float4)(0.0f)};
     Surfaces surfaces = {none, none};
     if (block >= 0) {
-        const Samples samples = {(int2)(side), (int2)(0), (int2)(side), disparities + (size_t)block * side * side};
+        const Samples samples = {(int2)(side), (int2)(0), (int2)(side), disparities + (size_t)block * side * side, (float2)(0.5f * side)};
         surfaces = surfaces_of(samples, gap);
     } else if (d > 0.0f) {
         surfaces.first.d = d;

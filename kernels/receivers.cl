@@ -2,6 +2,7 @@
 #ifndef PENUMBRA_RECEIVERS
 #define PENUMBRA_RECEIVERS
 #include "common/shared.h"
+#include "common/receiver_plane.clh"
 #include "horizon.cl" // ends every mask: the program that made it is at hand
 
 #if TILE_WIDTH != 16
@@ -60,36 +61,32 @@ __kernel void receivers_from_points(const ReceiverView view, __global const floa
     store_receiver(view, y * view.stride + x, there, p.x, p.y, p.z, xi, eta, d);
 }
 
-// A receiver's own plane as the light's view shows it: how its disparity changes with xi and with eta. A plane n . p = c has
-// d = (n.x tx xi + n.y ty eta + n.z) / c there, with tx, ty the view's tangents.
+// A receiver's own plane (common/receiver_plane.clh).
 //
-//   n            its surface's normal, towards the camera, in the camera's coordinates; 0: not known
-//   slope_xi     NO_PLANE: not known, or the light's centre does not see that side of the plane
-inline void store_plane(const ReceiverView view, const int at, const int there, const float3 n, __global const float* restrict xi, __global const float* restrict eta,
-                        __global const float* restrict d, __global float* restrict slope_xi, __global float* restrict slope_eta)
+//   n  its surface's normal, towards the camera, in the camera's coordinates; 0: not known
+inline void store_plane(const ReceiverView view, const int at, const int count, const int there, const float3 n, __global const float* restrict xi, __global const float* restrict eta,
+                        __global const float* restrict d, __global float* restrict planes)
 {
     const float nx = (view.light_from_camera[0] * n.x + view.light_from_camera[1] * n.y + view.light_from_camera[2] * n.z) / view.per_light_x;
     const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
     const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
-    // n . p over the receiver's depth: negative where the light's centre is before the plane.
-    const float facing = nx * xi[at] + ny * eta[at] + nz;
-    const bool known = there && d[at] != NO_RECEIVER && !view.light_orthographic && facing < -1e-4f;
-    slope_xi[at] = known ? nx * d[at] / facing : NO_PLANE;
-    slope_eta[at] = known ? ny * d[at] / facing : 0.0f;
+    const bool known = there && d[at] != NO_RECEIVER && !view.light_orthographic;
+    planes[at] = known ? nx * d[at] : 0.0f;
+    planes[count + at] = known ? ny * d[at] : 0.0f;
+    planes[2 * count + at] = known ? nx * xi[at] + ny * eta[at] + nz : 0.0f;
 }
 
 // receiver_planes: store_plane of every receiver.
 //
 //   normals [height][width][3]
-//   slope_xi, slope_eta [rows][stride]
-__kernel void receiver_planes(const ReceiverView view, __global const float* restrict normals, __global const float* restrict xi,
-                              __global const float* restrict eta, __global const float* restrict d, __global float* restrict slope_xi,
-                              __global float* restrict slope_eta)
+//   planes [3][rows][stride]
+__kernel void receiver_planes(const ReceiverView view, __global const float* restrict normals, __global const float* restrict xi, __global const float* restrict eta,
+                              __global const float* restrict d, __global float* restrict planes)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= view.stride || y >= view.rows) return;
     const float3 n = vload3(min(y, view.height - 1) * view.width + min(x, view.width - 1), normals);
-    store_plane(view, y * view.stride + x, x < view.width && y < view.height, n, xi, eta, d, slope_xi, slope_eta);
+    store_plane(view, y * view.stride + x, view.stride * view.rows, x < view.width && y < view.height, n, xi, eta, d, planes);
 }
 
 // receivers_of_pixels: what receivers_from_depth or receivers_from_points, and receiver_planes, say of some pixels of an image, as a list.
@@ -97,10 +94,11 @@ __kernel void receiver_planes(const ReceiverView view, __global const float* res
 //   view              of the whole image
 //   pixels [count]    y width + x
 //   depth [height][width], or points [height][width][3], the other null; normals [height][width][3], null: planes are not known
-//   xi, eta, d, slope_xi, slope_eta [length]   the slopes null where normals are
+//   xi, eta, d [length]
+//   planes [3][length]  null where normals are
 __kernel void receivers_of_pixels(const ReceiverView view, const int count, const int length, __global const uint* restrict pixels, __global const float* restrict depth,
                                   __global const float* restrict points, __global const float* restrict normals, __global float* restrict xi, __global float* restrict eta,
-                                  __global float* restrict d, __global float* restrict slope_xi, __global float* restrict slope_eta)
+                                  __global float* restrict d, __global float* restrict planes)
 {
     const int at = get_global_id(0);
     if (at >= length) return;
@@ -117,7 +115,7 @@ __kernel void receivers_of_pixels(const ReceiverView view, const int count, cons
         const float py = ((view.height - 2 * y - 1) * view.pixel_y + view.off_y) * spread;
         store_receiver(view, at, there && as_int(z) > 0 && as_int(z) < 0x7f800000, px, py, z, xi, eta, d);
     }
-    if (normals) store_plane(view, at, there, vload3(pixel, normals), xi, eta, d, slope_xi, slope_eta);
+    if (normals) store_plane(view, at, length, there, vload3(pixel, normals), xi, eta, d, planes);
 }
 
 inline float least(const float16 v)
@@ -184,9 +182,8 @@ __kernel void tile_bounds(const ReceiverView view, const float nearest, const fl
 // Launched over TILE_WIDTH x (count TILE_ROWS).
 __kernel void chosen_tiles(const ReceiverView view, __global const int* restrict tiles, const int count, const int has_planes,
                            __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                           __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict to_xi,
-                           __global float* restrict to_eta, __global float* restrict to_d, __global float* restrict to_slope_xi,
-                           __global float* restrict to_slope_eta)
+                           __global const float* restrict planes, __global float* restrict to_xi, __global float* restrict to_eta,
+                           __global float* restrict to_d, __global float* restrict to_planes)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= TILE_WIDTH || y >= count * TILE_ROWS) return;
@@ -197,8 +194,7 @@ __kernel void chosen_tiles(const ReceiverView view, __global const int* restrict
     to_eta[to] = eta[from];
     to_d[to] = d[from];
     if (!has_planes) return;
-    to_slope_xi[to] = slope_xi[from];
-    to_slope_eta[to] = slope_eta[from];
+    for (int i = 0; i < 3; ++i) to_planes[i * count * TILE_WIDTH * TILE_ROWS + to] = planes[i * view.stride * view.rows + from];
 }
 
 // sample_mask: a light-space mask seen from the receivers (Soft Shadow Maps, 3.1: "projected onto the scene").

@@ -2,6 +2,7 @@
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
+#include "common/receiver_plane.clh"
 #include "common/receiver_precision.clh"
 #include "common/shadow_test.clh"
 #include "common/stop.clh"
@@ -12,8 +13,8 @@
 //   visibility [height][width]  share of the texels that leave the receiver lit
 __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision, const int has_planes, const int taps,
                               __global const float2* restrict texels, __global const float2* restrict steps, __global const float* restrict xi,
-                              __global const float* restrict eta, __global const float* restrict d, __global const float* restrict slope_xi,
-                              __global const float* restrict slope_eta, __global float* restrict visibility, __global const volatile int* stop)
+                              __global const float* restrict eta, __global const float* restrict d, __global const float* restrict planes,
+                              __global float* restrict visibility, __global const volatile int* stop)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -24,7 +25,7 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
         // The window of texels whose centres lie nearest to the receiver.
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 first = convert_int2_rtn(place - 0.5f * (float)(taps - 1));
-        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const float2 slope = plane_slope(has_planes, planes, receivers.stride * receivers.rows, at);
         const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 0.5f * taps);
         sum = 0.0f;
         for (int j = 0; j < taps; ++j)
@@ -37,7 +38,7 @@ __kernel void shadow_map_taps(const ReceiverView receivers, const OccluderView o
 __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderView occluders, const float bias, const float precision,
                                  const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
                                  __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                                 __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility)
+                                 __global const float* restrict planes, __global float* restrict visibility)
 {
     const int x = get_global_id(0), y = get_global_id(1);
     if (x >= receivers.width || y >= receivers.height) return;
@@ -48,7 +49,7 @@ __kernel void shadow_map_bicubic(const ReceiverView receivers, const OccluderVie
         const int2 size = (int2)(occluders.width, occluders.height);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 t = place - 0.5f - convert_float2(low), s = 1.0f - t;
-        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const float2 slope = plane_slope(has_planes, planes, receivers.stride * receivers.rows, at);
         const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 2.0f);
 
         // The B-spline's four weights along each axis; they sum to 1.

@@ -10,6 +10,7 @@
 #include "common/shared.h"
 #include "occluders.cl"
 #include "receivers.cl"
+#include "common/receiver_plane.clh"
 #include "common/receiver_precision.clh"
 #include "common/shadow_test.clh"
 #include "common/bits.clh"
@@ -294,7 +295,7 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
                                  const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
                                  __global const float* restrict distances, __global const float* restrict depths, __global const float* restrict inner_distances,
                                  __global const float* restrict inner_depths, __global const float* restrict xi, __global const float* restrict eta,
-                                 __global const float* restrict d, __global const float* restrict slope_xi, __global const float* restrict slope_eta,
+                                 __global const float* restrict d, __global const float* restrict planes,
                                  __global float* restrict visibility)
 {
     const int x = get_global_id(0), y = get_global_id(1);
@@ -304,7 +305,7 @@ __kernel void smoothie_composite(const ReceiverView receivers, const OccluderVie
     float seen = 1.0f;
     if (shaded(occluders, place, d[at])) {
         const float rounding = rounding_of(d[at], receiver_precision(receivers, precision, d[at]));
-        const float2 slope = has_planes ? (float2)(slope_xi[at], slope_eta[at]) : (float2)(NO_PLANE);
+        const float2 slope = plane_slope(has_planes, planes, receivers.stride * receivers.rows, at);
         const ShadowLimit limit = shadow_limit(occluders, texels, steps, place, d[at], slope, bias, receiver_precision(receivers, precision, d[at]), 1.0f);
         const int2 low = convert_int2_rtn(place - 0.5f);
         const float2 part = place - 0.5f - convert_float2(low);

@@ -48,7 +48,7 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
                         const floatn xi, const floatn eta, const floatn d, const Limits limits)
 {
     const floatn below = b0 - eta, above = b1 - eta;
-    const floatn plane = fma((floatn)(0.5f * (b0 + b1)), limits.slope_eta, limits.level);
+    const floatn plane = fma((floatn)(0.5f * (b0 + b1)), limits.lean_eta, -limits.level);
     floatn total = *sum, rest = *lost;
     for (int i = 0; i < count; ++i) {
         const Patch patch = patches[i];
@@ -56,7 +56,7 @@ inline void add_patches(floatn* sum, floatn* lost, const Patch* patches, const i
         const floatn du = scale.x * reach, dv = scale.y * reach;
         const floatn u = saturate(fma(patch.a1 - xi, du, (floatn)(0.5f))) - saturate(fma(patch.a0 - xi, du, (floatn)(0.5f)));
         const floatn v = saturate(fma(above, dv, (floatn)(0.5f))) - saturate(fma(below, dv, (floatn)(0.5f)));
-        const intn before = (patch.d > limits.least) & (patch.d > fma((floatn)(patch.middle), limits.slope_xi, plane));
+        const intn before = (patch.d > limits.least) & (fma((floatn)(patch.middle), limits.lean_xi, plane) > limits.facing * patch.d);
         const floatn counted = select_lanes((floatn)(0.0f), u, before);
         ACCUMULATE(total, rest, counted, v * patch.covered);
     }
@@ -88,7 +88,7 @@ inline int patches_of_row(Patch* patches, __global const float2* texels, const i
 //   steps [height][width]       disparity steps of the map's surface
 //   bounds [tiles]              boxes of the tiles of receivers
 //   bias, precision             see limits_of
-//   has_planes, slope_xi, slope_eta   the receivers' own planes (receiver_planes), where they are known
+//   has_planes, planes          the receivers' own planes (common/receiver_plane.clh), where they are known
 //   visibility [height][width]  1 - occlusion, 0 to 1. With `merge` the smaller of that and what is there (3.5: the larger occlusion of two maps)
 //   evaluated [tiles]           texels that were evaluated against the tile's receivers, added to what is there with `merge`
 //   stop                        common/stop.clh, asked between superblocks
@@ -99,7 +99,7 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                               const float precision, const int has_planes, __global const float2* restrict texels, __global const float2* restrict steps,
                               __global const float* restrict blocks, __global const float* restrict superblocks, __global const float8* restrict bounds,
                               __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                              __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global float* restrict visibility,
+                              __global const float* restrict planes, __global float* restrict visibility,
                               __global uint* restrict evaluated, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
@@ -139,8 +139,8 @@ __kernel void soft_shadow_map(const ReceiverView receivers, const OccluderView o
                         const int at = (y + row) * receivers.stride + x;
                         const floatn own_xi = load_lanes(xi + at), own_eta = load_lanes(eta + at), own_d = load_lanes(d + at);
                         if (first_found)
-                            limits[row] = limits_with_planes(occluders, bias, receiver_precisions(receivers, precision, own_d), has_planes, texels, steps, has_planes ? load_lanes(slope_xi + at) : own_d,
-                                                             has_planes ? load_lanes(slope_eta + at) : own_d, own_xi, own_eta, own_d);
+                            limits[row] = limits_with_planes(occluders, bias, bias, receiver_precisions(receivers, precision, own_d), planes_of(has_planes, planes, receivers.stride * receivers.rows, at), texels,
+                                                             steps, own_xi, own_eta, own_d);
                         add_patches(&sum[row], &lost[row], patches, found, 1.0f - (j + 1) * search.texel.y, 1.0f - j * search.texel.y, scale, own_xi,
                                     own_eta, own_d, limits[row]);
                     }

@@ -17,6 +17,10 @@
 // Rows of a list share a search while their box is at most so large a part of the light as seen through what is nearest to it.
 #define SEARCH_SHARE 1.0f
 
+// How much of half a texel's steps a texel beside the receiver may lie above its plane: patches lean as their surface does, so that what is left of them above a plane
+// hides little. Measured (docs/soft_shadow_map.md, Self-shadowing).
+#define ROOM_TO_BEND 0.25f
+
 // --- Bits -----------------
 
 // 1 / x to 2 units in the last place, x a positive normal number: a linear guess of the bits and three Newton steps, a third of a division's time.
@@ -77,21 +81,38 @@ inline floatn outermost(const float edge, const floatn place, const Along along,
 // LANES receivers, and what counts for them.
 typedef struct {
     floatn xi, eta, d;
+    Planes planes;
     Limits limits;
 } Receivers;
+
+// The ends in the light of a patch, from a0 with disparity d0 to a1 with d1, that shows the surface on which the receivers lie: up to `edge` it is theirs. It is seen
+// edge-on, from its upper end on, on the side of that end. By the place of its lower end, which is not before the receiver, it would hide all that shines on it.
+inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const float a1, const float d0, const float d1, const floatn place, const floatn edge)
+{
+    const floatn here = fma(place - a0, (floatn)((d1 - d0) / (a1 - a0)), (floatn)(d0));
+    const intn own = (here <= edge) & (place > a0) & (place < a1);
+    if (d0 < d1)
+        *end0 = select_lanes(*end0, (floatn)(SIDE), own);
+    else
+        *end1 = select_lanes(*end1, d0 > d1 ? (floatn)(0.0f) : *end0, own);
+}
 
 // Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity.
 inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2 scale, const Receivers* receivers)
 {
     const floatn xi = receivers->xi, eta = receivers->eta, d = receivers->d, least = receivers->limits.least;
-    const floatn plane = fma((floatn)(0.5f * (p->a0 + p->a1)), receivers->limits.slope_xi, fma((floatn)(0.5f * (p->b0 + p->b1)), receivers->limits.slope_eta, receivers->limits.level));
-    const intn counts = (p->middle > least) & (p->middle > plane);
+    const floatn over = fma((floatn)(0.5f * (p->a0 + p->a1)), receivers->limits.lean_xi, fma((floatn)(0.5f * (p->b0 + p->b1)), receivers->limits.lean_eta, -receivers->limits.level));
+    const intn counts = (p->middle > least) & (over > receivers->limits.facing * p->middle);
     floatn v_bottom, v_top, u_left, u_right;
     if (plain) {
         v_bottom = samples_at(p->b0, eta, (floatn)(p->bottom.low), d, least, scale.y);
         v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
         u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
         u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
+        if (!ALL(receivers->limits.edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
+            end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, receivers->limits.edge);
+            end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, receivers->limits.edge);
+        }
     } else {
         v_bottom = outermost(p->b0, eta, p->bottom, true, d, least, scale.y);
         v_top = outermost(p->b1, eta, p->top, false, d, least, scale.y);
@@ -163,10 +184,10 @@ inline Rectangle rectangle_of_texel(const float middle, const float4 edges, cons
 // Whether all of a patch counts for each of LANES receivers, or none of it.
 inline bool on_one_side(__global const MicroPatch* p, const Rectangle* r, const Limits* limits)
 {
-    const floatn middle = fma((floatn)(0.5f * (r->a0 + r->a1)), limits->slope_xi, fma((floatn)(0.5f * (r->b0 + r->b1)), limits->slope_eta, limits->level));
-    const floatn half_plane = fma(fabs(limits->slope_xi), (floatn)(0.5f * (r->a1 - r->a0)), fabs(limits->slope_eta) * (0.5f * (r->b1 - r->b0)));
-    const floatn low = middle - half_plane, high = middle + half_plane;
-    const intn above = (p->least > limits->least) & (p->least > high), below = (p->reach <= limits->least) | (p->reach <= low);
+    const floatn middle = fma((floatn)(0.5f * (r->a0 + r->a1)), limits->lean_xi, fma((floatn)(0.5f * (r->b0 + r->b1)), limits->lean_eta, -limits->level));
+    const floatn half_plane = fma(fabs(limits->lean_xi), (floatn)(0.5f * (r->a1 - r->a0)), fabs(limits->lean_eta) * (0.5f * (r->b1 - r->b0)));
+    const floatn near = limits->facing * p->reach, far = limits->facing * p->least;
+    const intn above = (p->least > limits->edge) & (middle - half_plane > fmax(near, far)), below = (p->reach <= limits->least) | (middle + half_plane <= fmin(near, far));
     return ALL(above | below);
 }
 
@@ -210,6 +231,38 @@ inline float8 box_of(const Receivers* r)
 inline float8 both_boxes(const float8 a, const float8 b)
 {
     return (float8)(fmin(a.s0, b.s0), fmax(a.s1, b.s1), fmin(a.s2, b.s2), fmax(a.s3, b.s3), fmin(a.s4, b.s4), fmax(a.s5, b.s5), 0.0f, 0.0f);
+}
+
+// What receivers cannot see whatever casts: what does not shine, and what lies below the horizons of their own planes.
+//
+// Through a receiver and a sample at (u, v), 0 to 1 along the light's sides, goes the line xi + (u - 1/2) t / scale.x, eta + (v - 1/2) t / scale.y, d + t. It is above
+// the plane where (u - 1/2) lean_xi / scale.x + (v - 1/2) lean_eta / scale.y > facing. A plane that is not known has no horizon.
+//
+// tangents: of half the light's view. A sphere's disc lies across the way to its centre (as horizon.cl has it), the samples' across the view: the horizon cuts theirs
+// where it leaves as much of it as of the sphere's.
+inline void start(uintn* bits, __global const uint* light_rows, const bool sphere, const Receivers* receivers, const float2 tangents, const float2 scale)
+{
+    const floatn across = receivers->planes.lean_xi * ((1.0f / SIDE) / scale.x), along = receivers->planes.lean_eta * ((1.0f / SIDE) / scale.y);
+    for (int k = 0; k < SIDE; ++k) bits[k] = (uintn)(~light_rows[k]);
+    // How far above the plane the light's centre is, against its corners or its rim.
+    floatn over = -receivers->planes.facing, ends = (0.5f * SIDE) * (fabs(across) + fabs(along));
+    if (sphere) {
+        const floatn x = receivers->xi * tangents.x, y = receivers->eta * tangents.y, distance = sqrt(fma(x, x, fma(y, y, (floatn)(1.0f))));
+        const floatn sine = over / distance, cosine = sqrt(fmax(fma(-sine, sine, (floatn)(1.0f)), (floatn)(1e-12f)));
+        ends = (0.5f * SIDE) * sqrt(fma(across, across, along * along));
+        // In radii of the sphere: its middle's height over the plane, and the disc's place of it.
+        over = ends * (sine * distance / (cosine * receivers->d * (0.5f * tangents.x / scale.x)));
+    }
+    const intn whole = over >= ends;
+    if (ALL(whole)) return;
+    for (int k = 0; k < SIDE; ++k) {
+        uintn below = (uintn)(0u);
+        for (int i = 0; i < SIDE; ++i) {
+            const floatn above = fma(across, (floatn)(i + phases[k] - 0.5f * SIDE), fma(along, (floatn)(k + heights[i] - 0.5f * SIDE), over));
+            below |= select_lanes((uintn)(1u << i), (uintn)(0u), above > 0.0f);
+        }
+        bits[k] |= select_lanes(below, (uintn)(0u), whole);
+    }
 }
 
 // How many rows of a list, of those from `first` on, one search is for: 1, 2, 4 or 8, as long as they lie close together compared with how far the light is
@@ -262,7 +315,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                                 __global const MicroPatch* restrict patches, __global const float2* restrict texels, __global const float4* restrict edges,
                                 __global const float* restrict texel_reach, __global const float4* restrict parts, __global const float8* restrict bounds,
                                 __global const float* restrict xi, __global const float* restrict eta, __global const float* restrict d,
-                                __global const float* restrict slope_xi, __global const float* restrict slope_eta, __global const uint* restrict light_rows, const int light_samples,
+                                __global const float* restrict planes, __global const uint* restrict light_rows, const int light_samples,
                                 const int channels, __global const float* restrict emission, __global float* restrict visibility, __global uint* restrict evaluated, __global const volatile int* stop)
 {
     const int x = get_global_id(0) * LANES, y = get_global_id(1) * ITEM_ROWS;
@@ -280,6 +333,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         own[row].xi = load_lanes(xi + place);
         own[row].eta = load_lanes(eta + place);
         own[row].d = load_lanes(d + place);
+        own[row].planes = planes_of(has_planes, planes, receivers.stride * receivers.rows, place);
         if (lists) boxes[row] = box_of(&own[row]);
     }
     int together = ITEM_ROWS;
@@ -288,11 +342,12 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         if (lists) together = rows_of_search(boxes, top, nearest, search.half_inverse_scale, &search.box);
         uintn bits[ITEM_ROWS][SIDE];
         bool over[ITEM_ROWS]; // nothing is left to hide
-        for (int row = 0; row < together; ++row) {
-            for (int k = 0; k < SIDE; ++k) bits[row][k] = (uintn)(~light_rows[k]);
-            over[row] = false;
-        }
         int rows_left = together;
+        for (int row = 0; row < together; ++row) {
+            start(bits[row], light_rows, light_samples < SIDE * SIDE, &own[top + row], 1.0f / (float2)(receivers.per_light_x, receivers.per_light_y), scale);
+            over[row] = has_planes && all_hidden(bits[row], own[top + row].d);
+            rows_left -= over[row];
+        }
         const int2 last_size = levels.sizes[PATCH_LEVELS];
         const int4 roots = window(search, nearest, search.texel * (1 << PATCH_LEVELS), (int2)(0), last_size);
         for (int map = 0; map < maps && rows_left > 0; ++map) {
@@ -311,11 +366,9 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     const int number = (at.z == 0 ? first_texel : first_patch) + levels.begins[at.z] + at.y * levels.sizes[at.z].x + at.x;
                     const float2 cell = search.texel * (1 << at.z);
                     if (!has_limits) {
-                        for (int row = 0; row < together; ++row) {
-                            const int place = (y + top + row) * receivers.stride + x;
-                            own[top + row].limits = limits_with_planes(occluders, bias, receiver_precisions(receivers, precision, own[top + row].d), has_planes, texels + first_texel, 0, load_lanes((has_planes ? slope_xi : d) + place),
-                                                                 load_lanes((has_planes ? slope_eta : d) + place), own[top + row].xi, own[top + row].eta, own[top + row].d);
-                        }
+                        for (int row = 0; row < together; ++row)
+                            own[top + row].limits = limits_with_planes(occluders, bias, ROOM_TO_BEND * bias, receiver_precisions(receivers, precision, own[top + row].d), own[top + row].planes, texels + first_texel, 0,
+                                                                       own[top + row].xi, own[top + row].eta, own[top + row].d);
                         has_limits = true;
                     }
                     bool whole = true;

@@ -124,9 +124,10 @@ opencl::Specialisation program_of(const PreparedTechnique& data)
         data);
 }
 
-// Clips the light at the receivers' own planes.
+// Clips the light at the receivers' own planes, where the technique has not.
 void clip(opencl::Work& work, const Prepared::State& state, const Receiving& receivers, const cl::Buffer& visibility)
 {
+    if (!receivers.normals || needs_of(state.technique).clips_light) return;
     work.stage("clip at horizon");
     const PixelList* list = receivers.listed;
     const Horizon horizon{.light = state.light,
@@ -152,8 +153,8 @@ Image image_of(opencl::Work& work, const Prepared::State& state, const DepthMap&
     return image;
 }
 
-// Techniques that trace depth images clip the light of fitted receivers sample by sample; rays on the host meet the surface itself.
-bool clips_at_horizon(const Prepared::State& state, const ToShade& receivers)
+// Whether normals serve: techniques that trace depth images have those of fitted receivers already; rays on the host meet the surface itself.
+bool wants_normals(const Prepared::State& state, const ToShade& receivers)
 {
     return receivers.normals && !(needs_of(state.technique).depth_images && receivers.surface) && !row_of(kind_of(state.technique)).on_host;
 }
@@ -171,7 +172,7 @@ DeviceWhole on_device(opencl::Work& work, const Prepared::State& state, const To
     work.stage("upload receivers");
     const std::vector<DepthVector>* points = receivers.surface ? &receivers.surface->points : receivers.chosen ? &receivers.chosen->points : nullptr;
     whole.has_points = points != nullptr;
-    whole.has_normals = clips_at_horizon(state, receivers);
+    whole.has_normals = wants_normals(state, receivers);
     if (points)
         whole.points = work.lend(std::span<const DepthVector>(*points), "receiver points");
     else
@@ -205,7 +206,7 @@ Image shade_image(opencl::Work& work, const Prepared::State& state, const ToShad
     if (!row_of(kind_of(state.technique)).on_host) visibility = work.buffer<float>(receivers.depth.depth.size() * static_cast<std::size_t>(state.channels), "visibility");
     shaded.visibility = visibility.memory();
     shade_technique(work, state, all, shaded);
-    if (all.normals && visibility) clip(work, state, all, visibility.memory());
+    if (visibility) clip(work, state, all, visibility.memory());
     return image_of(work, state, receivers.depth, visibility, shaded);
 }
 
@@ -276,7 +277,7 @@ std::vector<float> shade_on_device(opencl::Work& work, const Prepared::State& st
     const auto visibility = work.buffer<float>(list.length() * static_cast<std::size_t>(state.channels), "visibility");
     shaded.visibility = visibility.memory();
     shade_technique(work, state, listed, shaded);
-    if (whole.normals) clip(work, state, listed, visibility.memory());
+    clip(work, state, listed, visibility.memory());
     std::vector<float> values = work.read(visibility);
     if (!emission_of(state.light) || state.channels != 1) return values;
     Image grey{.width = listed.width, .height = listed.height, .channels = 1, .pixels = std::move(values)};

@@ -62,8 +62,7 @@ ReceiverPoints room_for_points(opencl::Work& work, const ReceiverView& view, dou
             .xi = work.buffer<float>(count, "receivers' xi"),
             .eta = work.buffer<float>(count, "receivers' eta"),
             .d = work.buffer<float>(count, "receivers' disparity"),
-            .slope_xi = {},
-            .slope_eta = {}};
+            .planes = {}};
 }
 
 } // namespace
@@ -80,11 +79,10 @@ ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& vi
 void add_planes(opencl::Work& work, ReceiverPoints& points, const opencl::Buffer<DepthVector>& normals, const opencl::Specialisation& program)
 {
     const ReceiverView& view = points.view;
-    points.slope_xi = work.buffer<float>(points.d.count(), "receivers' slopes in xi");
-    points.slope_eta = work.buffer<float>(points.d.count(), "receivers' slopes in eta");
+    points.planes = work.buffer<float>(3 * points.d.count(), "receivers' planes");
     points.has_planes = true;
     work.launch(program, "receiver_planes", {static_cast<std::size_t>(view.stride), static_cast<std::size_t>(view.rows)}, {16, 8},
-                points.d.bytes() * 8, view, normals, points.xi, points.eta, points.d, points.slope_xi, points.slope_eta);
+                points.d.bytes() * 8, view, normals, points.xi, points.eta, points.d, points.planes);
 }
 
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,
@@ -105,13 +103,10 @@ ReceiverPoints listed_receiver_points(opencl::Work& work, const ReceiverView& vi
     ReceiverPoints points = room_for_points(work, of_list, precision);
     points.is_list = true;
     points.has_planes = image.normals != nullptr;
-    if (points.has_planes) {
-        points.slope_xi = work.buffer<float>(points.d.count(), "receivers' slopes in xi");
-        points.slope_eta = work.buffer<float>(points.d.count(), "receivers' slopes in eta");
-    }
+    if (points.has_planes) points.planes = work.buffer<float>(3 * points.d.count(), "receivers' planes");
     work.launch(program, "receivers_of_pixels", {list.length(), 1}, {64, 1}, list.count() * 40, view, static_cast<cl_int>(list.count()), static_cast<cl_int>(list.length()), list.pixels,
                 image.points ? cl::Buffer() : image.depth, image.points ? image.points->memory() : cl::Buffer(), image.normals ? image.normals->memory() : cl::Buffer(), points.xi, points.eta,
-                points.d, points.slope_xi, points.slope_eta);
+                points.d, points.planes);
     return points;
 }
 

@@ -21,8 +21,7 @@ struct ReceiverPoints {
     ReceiverView view{};
     double precision = 0; // of the depth they came from, relative
     opencl::Buffer<float> xi, eta, d;
-    // How disparity changes along each receiver's own plane (receivers.cl, receiver_planes); none: planes are not known.
-    opencl::Buffer<float> slope_xi, slope_eta;
+    opencl::Buffer<float> planes; // of each receiver's own surface, [3][rows][stride] (common/receiver_plane.clh); none: not known
     bool has_planes = false;
     bool is_list = false; // neighbours of a row lie together, rows need not
 };

@@ -69,12 +69,12 @@ void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, con
     const auto has_planes = static_cast<cl_int>(receivers.has_planes);
     if (prepared.settings.filter == ShadowFilter::bicubic) {
         work.launch(program, "shadow_map_bicubic", grid, {16, 8}, bytes, view, prepared.view, bias, precision, has_planes, prepared.map.texels,
-                    prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
+                    prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.planes, visibility);
         return;
     }
     const cl_int taps = prepared.settings.filter == ShadowFilter::hard ? 1 : prepared.settings.taps;
     work.launch(program, "shadow_map_taps", grid, {16, 8}, bytes, view, prepared.view, bias, precision, has_planes, taps, prepared.map.texels,
-                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, work.stop());
+                prepared.map.steps, receivers.xi, receivers.eta, receivers.d, receivers.planes, visibility, work.stop());
 }
 
 Needs needs(const ShadowMap&) { return {.front = true, .every_receiver = true}; } // hard, or as wide as its filter

@@ -305,7 +305,7 @@ void shade_smoothie(opencl::Work& work, const PreparedSmoothie& prepared, const 
     work.launch(prepared.program, "smoothie_composite", grid, {16, 8}, grid[0] * grid[1] * 16, receivers.view, prepared.occluders, view,
                 static_cast<float>(prepared.settings.bias), static_cast<float>(std::max(prepared.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), prepared.map.texels, prepared.map.steps, fin_distances, depths, distances, inner_depths, receivers.xi, receivers.eta,
-                receivers.d, receivers.slope_xi, receivers.slope_eta, visibility);
+                receivers.d, receivers.planes, visibility);
     if (!wanted || !wanted->counts) return;
     for (const cl_uint edges : work.read(evaluated)) wanted->counts->pairs += std::uint64_t{edges} * static_cast<std::uint64_t>(grid_of_texels.item_texels());
 }

@@ -45,9 +45,9 @@ PreparedSoftShadowMap::Side prepare_side(opencl::Work& work, const PreparedSoftS
     return side;
 }
 
-// Texels of all maps of a union together, as long as nobody asks for a resolution: larger maps become surfaces with what they cover of larger texels, which
-// loses little, and a map takes 51 bytes a texel, one that was reduced 133.
-constexpr double most_union_texels = 1 << 21;
+// Texels of all maps of a union together, as long as nobody asks for a resolution: five maps of 1024 x 1024, 51 bytes a texel. More become surfaces with what they
+// cover of fewer, larger texels, 133 bytes each.
+constexpr double most_union_texels = 6 << 20, most_reduced_texels = 1 << 21;
 
 // Samples along one side of texels in which something begins or ends, of maps that are rendered (docs/soft_shadow_map.md).
 constexpr int fine_side = 4;
@@ -59,7 +59,9 @@ MapSize size_of(const OccluderDepth& depth, const SoftShadowMap& settings)
     const double maps = (settings.sides == Sides::both ? 2 : 1) + static_cast<double>(depth.layers.size());
     const double texels = static_cast<double>(depth.width) * depth.height * maps;
     if (texels <= most_union_texels) return {depth.width, depth.height};
-    return reduced_size(depth.width, depth.height, std::max(1, static_cast<int>(std::max(depth.width, depth.height) * std::sqrt(most_union_texels / texels))));
+    // By a whole number, so that samples lie alike in every texel.
+    const int longer = std::max(depth.width, depth.height), by = static_cast<int>(std::ceil(std::sqrt(texels / most_reduced_texels)));
+    return reduced_size(depth.width, depth.height, std::max(1, longer / by));
 }
 
 // Maps of a union, and of each the samples of some texels where there are such.
@@ -137,7 +139,7 @@ void shade_side(opencl::Work& work, const PreparedSoftShadowMap& prepared, const
     const float precision = static_cast<float>(std::max(prepared.precision, receivers.precision));
     work.launch(prepared.program, "soft_shadow_map", tiling.items, tiling.group, tiling.bytes + side.map.texels.bytes(), receivers.view, prepared.view,
                 static_cast<cl_int>(merge), prepared.nearest, bias, precision, static_cast<cl_int>(receivers.has_planes), side.map.texels, side.map.steps, side.blocks,
-                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, visibility, evaluated, work.stop());
+                side.superblocks, bounds, receivers.xi, receivers.eta, receivers.d, receivers.planes, visibility, evaluated, work.stop());
 }
 
 // Says what shading will take before it begins.
@@ -299,6 +301,7 @@ Needs needs(const SoftShadowMap& settings)
             .receivers_from_light = settings.project,
             .fine = settings.visibility == PatchVisibility::united && settings.resolution == 0 ? fine_side : 0,
             .fine_texels = most_union_texels,
+            .clips_light = settings.visibility == PatchVisibility::united && !settings.project,
             .maps_tell_all = settings.visibility == PatchVisibility::united}; // a sum's larger texels reach beyond what the maps show
 }
 

@@ -183,7 +183,7 @@ void shade_union(opencl::Work& work, const PreparedUnion& prepared, const Occlud
     work.launch(union_program(lanes), "soft_shadow_union", tiling.items, tiling.group, tiling.bytes + prepared.patches.bytes(), receivers.view, view, static_cast<cl_int>(prepared.maps),
                 static_cast<cl_int>(prepared.above), prepared.nearest, static_cast<float>(shading.bias), static_cast<float>(std::max(shading.precision, receivers.precision)),
                 static_cast<cl_int>(receivers.has_planes), static_cast<cl_int>(receivers.is_list && lanes > 1), static_cast<float>(coarse_per_tolerance * shading.tolerance), prepared.reach,
-                prepared.patches, prepared.texels, prepared.edges, prepared.texel_reach, prepared.parts, bounds, receivers.xi, receivers.eta, receivers.d, receivers.slope_xi, receivers.slope_eta, prepared.light_rows,
+                prepared.patches, prepared.texels, prepared.edges, prepared.texel_reach, prepared.parts, bounds, receivers.xi, receivers.eta, receivers.d, receivers.planes, prepared.light_rows,
                 static_cast<cl_int>(prepared.light_samples), static_cast<cl_int>(prepared.channels), prepared.emission, visibility, evaluated, work.stop());
 }
 

@@ -62,6 +62,8 @@ struct Needs {
     // `fine_texels` go without.
     int fine = 0;
     double fine_texels = 0;
+    // It knows the receivers' planes and leaves out what of the light lies below their horizons, sample by sample.
+    bool clips_light = false;
     // What its maps show between a receiver and the light, and the receiver's own horizon, are all that darkens it.
     bool maps_tell_all = false;
     // Its penumbrae are not the light's, so that nothing tells receivers from their neighbours.

@@ -23,7 +23,7 @@ ChosenTiles chosen_tiles(opencl::Work& work, const ReceiverPoints& points, const
     const std::vector<cl_int> numbers = spread_numbers(columns, rows, count);
     const auto tiles = work.upload(std::span<const cl_int>(numbers), "tiles of a sample");
 
-    ChosenTiles chosen{.points = {.view = points.view, .precision = points.precision, .xi = {}, .eta = {}, .d = {}, .slope_xi = {}, .slope_eta = {}, .has_planes = points.has_planes, .is_list = points.is_list},
+    ChosenTiles chosen{.points = {.view = points.view, .precision = points.precision, .xi = {}, .eta = {}, .d = {}, .planes = {}, .has_planes = points.has_planes, .is_list = points.is_list},
                        .times = static_cast<double>(tile_count(points.view)) / count};
     ReceiverPoints& some = chosen.points;
     some.view.width = some.view.stride = TILE_WIDTH;
@@ -32,13 +32,10 @@ ChosenTiles chosen_tiles(opencl::Work& work, const ReceiverPoints& points, const
     some.xi = room();
     some.eta = room();
     some.d = room();
-    if (points.has_planes) {
-        some.slope_xi = room();
-        some.slope_eta = room();
-    }
+    if (points.has_planes) some.planes = work.buffer<float>(3 * some.d.count(), "receivers' planes of a sample");
     work.launch(program, "chosen_tiles", {TILE_WIDTH, static_cast<std::size_t>(some.view.rows)}, {TILE_WIDTH, tile_rows}, some.d.bytes() * 6, points.view, tiles,
-                static_cast<cl_int>(count), static_cast<cl_int>(points.has_planes), points.xi, points.eta, points.d, points.slope_xi, points.slope_eta, some.xi, some.eta, some.d,
-                some.slope_xi, some.slope_eta);
+                static_cast<cl_int>(count), static_cast<cl_int>(points.has_planes), points.xi, points.eta, points.d, points.planes, some.xi, some.eta, some.d,
+                some.planes);
     return chosen;
 }
 
