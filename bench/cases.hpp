@@ -30,7 +30,7 @@ void occlusion_sheet(const Engine& engine);     // a tilted sheet: more slices m
 void smoothies(const Engine& engine);           // smoothie over buffers, triangles and widths, beside shadow maps
 void smoothie_light_size(const Engine& engine); // its error over the light's size
 void image_io(const Engine& engine);            // images from and to bytes beside OpenImageIO
-void suite(const Engine& engine);               // ten scenes by several settings and by rays, 4096-ray references
+void suite(const Engine& engine);               // eleven scenes by several settings and by rays, 4096-ray references
 std::vector<std::string>& suite_settings();     // those of the suite, "kind:key=value,key=value"; empty: the usual ones
 void limits(const Engine& engine);              // the device's arithmetic and memory limits, and what the inner loop reaches
 

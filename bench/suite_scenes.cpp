@@ -150,6 +150,12 @@ std::vector<SuiteScene> suite_scenes(int texels, int receivers)
     add("foliage", foliage(), 0.5, 3);
     add("open_parts", open_parts(), 1, 3);
     add("wide_light", bunny, 5, 3);
+
+    // On itself and on what it stands on, seen from beside.
+    add("bunny_itself", bunny, 1, standing_height(bunny));
+    Scene& itself = scenes.back().scene;
+    itself.objects.front().receives = true;
+    itself.receivers.camera = PinholeCamera{.frame = {.origin = {0, 3.5, 4.5}, .x = {1, 0, 0}, .y = {0, 0.8192, -0.5735}, .z = {0, 0.5735, 0.8192}}, .tan_half_fov = {0.4, 0.4}, .shift = {}};
     return scenes;
 }
 

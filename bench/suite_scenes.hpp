@@ -13,7 +13,7 @@ struct SuiteScene {
     Scene scene;
 };
 
-// Ten, each of an occluder over the plane of paper_scene (scenes.hpp), which only receives: closed and open, near and far, under lights that are small,
+// Eleven, each of an occluder over the plane of paper_scene (scenes.hpp); only the last one's receives itself: closed and open, near and far, under lights that are small,
 // of the casters' size, and larger than the scene. Both maps have `texels` a side.
 std::vector<SuiteScene> suite_scenes(int texels, int receivers);
 

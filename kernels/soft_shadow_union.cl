@@ -21,6 +21,10 @@
 // hides little. Measured (docs/soft_shadow_map.md, Self-shadowing).
 #define ROOM_TO_BEND 0.25f
 
+// A patch shows the surface that a receiver lies on as far as so many texels beside it, and so much of its own steps above it. Measured as above.
+#define BESIDE_RECEIVER 0.25f
+#define STEPS_OF_SURFACE 0.25f
+
 // --- Bits -----------------
 
 // 1 / x to 2 units in the last place, x a positive normal number: a linear guess of the bits and three Newton steps, a third of a division's time.
@@ -85,16 +89,18 @@ typedef struct {
     Limits limits;
 } Receivers;
 
-// The ends in the light of a patch, from a0 with disparity d0 to a1 with d1, that shows the surface on which the receivers lie: up to `edge` it is theirs. It is seen
-// edge-on, from its upper end on, on the side of that end. By the place of its lower end, which is not before the receiver, it would hide all that shines on it.
+// The ends in the light of a patch, from a0 with disparity d0 to a1 with d1, that shows the surface on which the receivers lie: it reaches to
+// their place, or nearly, and goes on there up to `edge`. It is seen edge-on: it hides what lies beyond its upper end, where it does not fall away from there. By its lower end, which is
+// hardly before the receiver, it would hide all that shines on it.
 inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const float a1, const float d0, const float d1, const floatn place, const floatn edge)
 {
-    const floatn here = fma(place - a0, (floatn)((d1 - d0) / (a1 - a0)), (floatn)(d0));
-    const intn own = (here <= edge) & (place > a0) & (place < a1);
+    const float wide = a1 - a0;
+    const floatn here = fma(place - a0, (floatn)((d1 - d0) / wide), (floatn)(d0));
+    const intn own = (here <= edge) & (place > a0 - BESIDE_RECEIVER * wide) & (place < a1 + BESIDE_RECEIVER * wide);
     if (d0 < d1)
-        *end0 = select_lanes(*end0, (floatn)(SIDE), own);
+        *end0 = select_lanes(*end0, select_lanes(*end1, (floatn)(SIDE), place < a1), own);
     else
-        *end1 = select_lanes(*end1, d0 > d1 ? (floatn)(0.0f) : *end0, own);
+        *end1 = select_lanes(*end1, select_lanes(*end0, (floatn)(0.0f), (place > a0) & (intn)(d0 > d1 ? -1 : 0)), own);
 }
 
 // Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity.
@@ -109,9 +115,11 @@ inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2
         v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
         u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
         u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
-        if (!ALL(receivers->limits.edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
-            end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, receivers->limits.edge);
-            end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, receivers->limits.edge);
+        const float steps = STEPS_OF_SURFACE * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low));
+        const floatn reached = least + steps, edge = select_lanes(receivers->limits.edge, reached, reached > receivers->limits.edge);
+        if (!ALL(edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
+            end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, edge);
+            end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, edge);
         }
     } else {
         v_bottom = outermost(p->b0, eta, p->bottom, true, d, least, scale.y);

@@ -1,0 +1,181 @@
+// Bodies that cast on themselves, as soft_shadow_map's union has them. A body that bulges everywhere casts none of its shadow on itself: what darkens it is its own
+// horizons, which have closed forms.
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include <penumbra/engine.hpp>
+
+#include "io/mesh_io.hpp"
+
+namespace penumbra::test {
+namespace {
+
+constexpr int side = 128;
+
+Object object_of(std::vector<Vec3> positions, std::vector<std::array<std::uint32_t, 3>> triangles)
+{
+    Object object;
+    object.name = "body";
+    for (const Vec3& p : positions) object.mesh.positions.emplace_back(p);
+    for (const auto& t : triangles) object.mesh.triangles.push_back({t[0], t[1], t[2]});
+    object.casts = object.receives = true;
+    return object;
+}
+
+// A ball of 20 * 4^divisions facets.
+Object ball(int divisions, const Vec3& center)
+{
+    const double t = (1 + std::sqrt(5.)) / 2;
+    std::vector<Vec3> corners{{-1, t, 0}, {1, t, 0}, {-1, -t, 0}, {1, -t, 0}, {0, -1, t}, {0, 1, t}, {0, -1, -t}, {0, 1, -t}, {t, 0, -1}, {t, 0, 1}, {-t, 0, -1}, {-t, 0, 1}};
+    std::vector<std::array<std::uint32_t, 3>> facets{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                                    {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+    for (Vec3& corner : corners) corner = corner.normalized();
+    for (int i = 0; i < divisions; ++i) {
+        std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+        const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+            const auto [place, made] = middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(corners.size()));
+            if (made) corners.push_back((corners[a] + corners[b]).normalized());
+            return place->second;
+        };
+        std::vector<std::array<std::uint32_t, 3>> finer;
+        for (const auto& [a, b, c] : facets) {
+            const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+            finer.insert(finer.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
+        }
+        facets = std::move(finer);
+    }
+    for (Vec3& corner : corners) corner = corner + center;
+    return object_of(std::move(corners), std::move(facets));
+}
+
+Object box(const Vec3& center, double half)
+{
+    std::vector<Vec3> corners;
+    for (int i = 0; i < 8; ++i) corners.push_back(center + Vec3((i & 4) ? half : -half, (i & 2) ? half : -half, (i & 1) ? half : -half));
+    return object_of(std::move(corners), {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1}, {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}});
+}
+
+// Two rows of ridges: each hides the other's foot from low light.
+Object ridges(int count)
+{
+    std::vector<Vec3> corners;
+    std::vector<std::array<std::uint32_t, 3>> facets;
+    for (int i = 0; i <= 2 * count; ++i)
+        for (const double z : {1.2, -1.2}) corners.emplace_back(1.2 * (i - count) / count, i % 2 ? 0.25 : 0, z);
+    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(2 * count); ++i) facets.insert(facets.end(), {{2 * i, 2 * i + 2, 2 * i + 3}, {2 * i, 2 * i + 3, 2 * i + 1}});
+    return object_of(std::move(corners), std::move(facets));
+}
+
+Scene scene_of(const Light& light, Object object, int texels)
+{
+    Scene scene;
+    scene.light = light;
+    scene.objects = {std::move(object)};
+    scene.occluders.width = scene.occluders.height = texels;
+    const Vec3 z = Vec3(0.1, 3.2, 3.4).normalized(), x = Vec3(0, 1, 0).cross(z).normalized();
+    scene.receivers.camera = PinholeCamera{.frame = {.origin = z * 4.6, .x = x, .y = z.cross(x), .z = z}, .tan_half_fov = {0.32, 0.32}, .shift = {}};
+    scene.receivers.width = scene.receivers.height = side;
+    return scene;
+}
+
+SphereLight sphere(double degrees)
+{
+    const Vec3 towards = Vec3(0.4, 0.9, 0.3).normalized();
+    return {.center = towards * 12, .radius = 12 * std::tan(degrees / 2 * std::numbers::pi / 180), .direction = -towards, .up = {}};
+}
+RectangleLight rectangle() { return {.center = {2, 5, 2}, .half_u = {1, 0, 0}, .half_v = {0, 0, -1}, .emission = {}}; }
+
+const Engine& engine()
+{
+    static const Engine made;
+    return made;
+}
+
+struct Difference {
+    double mean = 0, bias = 0, most = 0; // over shadow pixels, largest over all
+    int alone = 0;                       // lit ones that are dark
+};
+Difference difference(const Scene& scene, const Technique& technique)
+{
+    const Image seen = engine().mask(scene, technique).visibility, rays = engine().mask(scene, RayTraced{.samples = 1024}).visibility;
+    Difference all;
+    int shadow = 0;
+    for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
+        const double step = static_cast<double>(seen.pixels[i]) - static_cast<double>(rays.pixels[i]);
+        all.most = std::max(all.most, std::abs(step));
+        all.alone += rays.pixels[i] == 1.f && seen.pixels[i] < 0.9f;
+        if (rays.pixels[i] >= 0.999f && seen.pixels[i] >= 0.999f) continue;
+        all.mean += std::abs(step);
+        all.bias += step;
+        ++shadow;
+    }
+    EXPECT_GT(shadow, 100) << "hardly a shadow";
+    all.mean /= std::max(shadow, 1);
+    all.bias /= std::max(shadow, 1);
+    return all;
+}
+
+SoftShadowMap exact() { return {.tolerance = 0}; }
+
+// 1024 rays are off by .005 where half the light is hidden; a sphere's samples by as much again.
+TEST(ShadowsOfOneself, ABallIsDarkenedByItsHorizonsAlone)
+{
+    for (const int texels : {128, 256, 512})
+        for (const Light& light : {Light(sphere(20)), Light(sphere(2)), Light(rectangle())}) {
+            const Difference off = difference(scene_of(light, ball(3, {0, 0, 0}), texels), exact());
+            EXPECT_LT(off.mean, 0.006) << texels;
+            EXPECT_LT(std::abs(off.bias), 0.003) << texels;
+            EXPECT_EQ(off.alone, 0) << texels;
+        }
+}
+// Its front sees half of what shines from above.
+TEST(ShadowsOfOneself, ABoxesFaces)
+{
+    for (const double z : {0.4, 0.7, 1.}) {
+        const RectangleLight above{.center = {0.1, 4, z}, .half_u = {1, 0, 0}, .half_v = {0, 0, -1}, .emission = {}};
+        const Difference off = difference(scene_of(above, box({0, 0, 0}, 0.7), 256), exact());
+        EXPECT_LT(off.mean, 0.006);
+        EXPECT_EQ(off.alone, 0);
+    }
+}
+
+// Neither the sizes of texels and of the samples that they come from, nor what lies between decides whether a surface darkens itself.
+TEST(ShadowsOfOneself, OfMapsThatAreReduced)
+{
+    for (const int resolution : {100, 150, 173, 255}) {
+        const Difference off = difference(scene_of(rectangle(), ball(3, {0, 0, 0}), 256), SoftShadowMap{.resolution = resolution, .tolerance = 0});
+        EXPECT_LT(off.mean, 0.006) << resolution;
+        EXPECT_LE(off.alone, 2) << resolution;
+    }
+}
+
+// What hides a foot's light lies partly above its horizon, and partly not: both count, each once.
+TEST(ShadowsOfOneself, RidgesHideEachOthersFeet)
+{
+    const RectangleLight low{.center = {5, 1.6, 0}, .half_u = {0, 1, 0}, .half_v = {0, 0, 1}, .emission = {}};
+    for (const int texels : {256, 512}) {
+        const Difference off = difference(scene_of(low, ridges(4), texels), exact());
+        EXPECT_LT(off.mean, 0.01) << texels;
+        EXPECT_LT(std::abs(off.bias), 0.005) << texels;
+        EXPECT_EQ(off.alone, 0) << texels;
+    }
+}
+
+// Each of its 70,000 faces is as large as five texels: what is finer than a texel stays unknown, most of it where light grazes a face. (Where the lesser of what casts and
+// what the horizon cuts was taken: .032, .022 too bright.)
+TEST(ShadowsOfOneself, OfABunny)
+{
+    Object body;
+    body.name = "bunny";
+    body.mesh = read_mesh(PENUMBRA_BUNNY, "bunny");
+    const Difference off = difference(scene_of(sphere(20), body, 512), exact());
+    EXPECT_LT(off.mean, 0.02);
+    EXPECT_LT(std::abs(off.bias), 0.011);
+    EXPECT_EQ(off.alone, 0);
+}
+
+} // namespace
+} // namespace penumbra::test
