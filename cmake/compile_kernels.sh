@@ -33,7 +33,7 @@ compile='
         exit 1
     fi
     for target in host $targets; do
-        if [ "$target" = host ]; then machine="-include opencl-c-base.h -include $kernels/common/builtins_pocl_31.clh"; else machine="-target $target -nogpulib -Xclang -finclude-default-header"; fi
+        if [ "$target" = host ]; then machine="-cl-no-stdinc -include opencl-c-base.h -include $kernels/common/builtins_pocl_31.clh"; else machine="-target $target -nogpulib -Xclang -finclude-default-header"; fi
         if ! "$clang" -x cl -cl-std=CL1.2 $machine -Wall -Wextra -Wundef -Werror -fsyntax-only -I "$kernels" "$@" "$kernels/$file"; then
             echo "compile_kernels: failed for $target: $file $*" >&2
             exit 1

@@ -83,3 +83,25 @@ __kernel void slope_steps(const int2 size, const float precision, __global const
     if (x >= size.x || y >= size.y) return;
     steps[y * size.x + x] = steps_of_texel(size, texels, x, y, precision);
 }
+
+// --- A directional light's maps -----------------
+//
+// Its view is orthographic: planes are linear in z there, as they are in 1 / z of a perspective. What compares disparities needs one that grows towards
+// the light, is positive and linear on planes: 2 - z / reach, with reach at least the greatest depth of all maps, so that the relative precision of depths holds for it.
+
+// greatest_depths: the greatest depth of a map and of those before, in as many parts as there are work-items.
+__kernel void greatest_depths(const int count, __global const float* restrict depth, __global float* restrict greatest)
+{
+    const int part = get_global_id(0), parts = get_global_size(0);
+    float most = greatest[part];
+    for (int at = part; at < count; at += parts)
+        if (disparity_of(depth[at]) > 0.0f && depth[at] > most) most = depth[at];
+    greatest[part] = most;
+}
+
+// depths_of_endless: depths whose disparities are 2 - z / reach; 0 where nothing is.
+__kernel void depths_of_endless(const int count, const float reach, __global const float* restrict depth, __global float* restrict result)
+{
+    const int at = get_global_id(0);
+    if (at < count) result[at] = disparity_of(depth[at]) > 0.0f ? 1.0f / (2.0f - depth[at] / reach) : 0.0f;
+}

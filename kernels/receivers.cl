@@ -19,7 +19,8 @@ inline void store_receiver(const ReceiverView view, const int at, const int ther
     // Nearer than the least normal number counts as at the light: one over it would be beyond binary32.
     const bool before = there && lz >= 0x1p-126f;
 
-    const float disparity = 1.0f / lz;
+    // The farthest receivers stay finite.
+    const float disparity = view.light_reach > 0.0f ? fmax(2.0f - lz / view.light_reach, -0x1p60f) : 1.0f / lz;
     const float scale = view.light_orthographic ? 1.0f : disparity;
     xi[at] = before ? lx * scale * view.per_light_x : 0.0f;
     eta[at] = before ? ly * scale * view.per_light_y : 0.0f;
@@ -70,10 +71,11 @@ inline void store_plane(const ReceiverView view, const int at, const int count, 
     const float nx = (view.light_from_camera[0] * n.x + view.light_from_camera[1] * n.y + view.light_from_camera[2] * n.z) / view.per_light_x;
     const float ny = (view.light_from_camera[4] * n.x + view.light_from_camera[5] * n.y + view.light_from_camera[6] * n.z) / view.per_light_y;
     const float nz = view.light_from_camera[8] * n.x + view.light_from_camera[9] * n.y + view.light_from_camera[10] * n.z;
-    const bool known = there && d[at] != NO_RECEIVER && !view.light_orthographic;
-    planes[at] = known ? nx * d[at] : 0.0f;
-    planes[count + at] = known ? ny * d[at] : 0.0f;
-    planes[2 * count + at] = known ? nx * xi[at] + ny * eta[at] + nz : 0.0f;
+    const bool endless = view.light_reach > 0.0f, known = there && d[at] != NO_RECEIVER && (endless || !view.light_orthographic);
+    const float scale = endless ? 1.0f / view.light_reach : d[at];
+    planes[at] = known ? nx * scale : 0.0f;
+    planes[count + at] = known ? ny * scale : 0.0f;
+    planes[2 * count + at] = known ? (endless ? nz : nx * xi[at] + ny * eta[at] + nz) : 0.0f;
 }
 
 // receiver_planes: store_plane of every receiver.

@@ -205,7 +205,7 @@ inline int meeting(const Search search, const float4 reach, const float2 cell, c
     const float4 rise = reach - search.box.s4, extent_x = rise * search.half_inverse_scale.x, extent_y = rise * search.half_inverse_scale.y;
     const float4 wide = fma((float4)(0x1p-20f), 1.0f + extent_x, extent_x), high = fma((float4)(0x1p-20f), 1.0f + extent_y, extent_y); // as penumbra_extent
     const float4 left = convert_float4(x), top = convert_float4(y);
-    const int4 meets = (rise > 0.0f) & (left * cell.x - 1.0f - wide <= search.box.s1 + cell.x * 0.0625f) & ((left + 1.0f) * cell.x - 1.0f + wide >= search.box.s0 - cell.x * 0.0625f)
+    const int4 meets = (reach > 0.0f) & (rise > 0.0f) & (left * cell.x - 1.0f - wide <= search.box.s1 + cell.x * 0.0625f) & ((left + 1.0f) * cell.x - 1.0f + wide >= search.box.s0 - cell.x * 0.0625f)
                        & (1.0f - (top + 1.0f) * cell.y - high <= search.box.s3 + cell.y * 0.0625f) & (1.0f - top * cell.y + high >= search.box.s2 - cell.y * 0.0625f);
     const int4 bits = meets & (int4)(1, 2, 4, 8);
     return bits.s0 | bits.s1 | bits.s2 | bits.s3;
@@ -352,7 +352,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
         bool over[ITEM_ROWS]; // nothing is left to hide
         int rows_left = together;
         for (int row = 0; row < together; ++row) {
-            start(bits[row], light_rows, light_samples < SIDE * SIDE, &own[top + row], 1.0f / (float2)(receivers.per_light_x, receivers.per_light_y), scale);
+            start(bits[row], light_rows, light_samples < SIDE * SIDE && !receivers.light_orthographic, &own[top + row], 1.0f / (float2)(receivers.per_light_x, receivers.per_light_y), scale);
             over[row] = has_planes && all_hidden(bits[row], own[top + row].d);
             rows_left -= over[row];
         }

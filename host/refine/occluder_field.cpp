@@ -177,8 +177,8 @@ bool OccluderField::shows_all(const Query& query) const
 
 bool OccluderField::all_above(const Vec3& world, const Vec3& normal, double turned) const
 {
-    if (view_.orthographic) return false; // not asked yet
-    const Vec3 to = light_.origin - world;
+    // Towards a directional light's middle, to where its disc has the extents that it is given by: tangents.
+    const Vec3 to = light_.directional ? -light_.direction : light_.origin - world;
     // Of a sphere what reaches towards the receivers as well.
     const double reach = light_.half_u * std::abs(normal.dot(light_.u)) + light_.half_v * std::abs(normal.dot(light_.v)) +
                          std::max(light_.half_u, light_.half_v) * std::abs(normal.dot(light_.direction));

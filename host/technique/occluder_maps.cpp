@@ -67,6 +67,31 @@ DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bo
     return result;
 }
 
+EndlessDepth endless_depth(opencl::Work& work, const OccluderDepth& depth, const opencl::Specialisation& program)
+{
+    EndlessDepth endless{.depth = depth, .made = {}, .reach = 0};
+    if (!depth.light.directional) return endless;
+    std::vector<std::pair<cl::Buffer*, std::size_t>> maps;
+    const std::size_t count = static_cast<std::size_t>(depth.width) * static_cast<std::size_t>(depth.height);
+    for (cl::Buffer* map : {&endless.depth.front, &endless.depth.back})
+        if ((*map)()) maps.emplace_back(map, count);
+    for (cl::Buffer& map : endless.depth.layers) maps.emplace_back(&map, count);
+    for (cl::Buffer& map : endless.depth.fine.depth) maps.emplace_back(&map, depth.fine.samples);
+
+    constexpr std::size_t parts = 256;
+    const auto greatest = work.upload(std::span<const float>(std::vector<float>(parts, 0.F)), "greatest depths");
+    for (const auto& [map, samples] : maps) work.launch(program, "greatest_depths", {parts, 1}, {64, 1}, samples * 4, static_cast<cl_int>(samples), *map, greatest);
+    for (const float most : work.read(greatest)) endless.reach = std::max(endless.reach, most);
+    // Not less than the view is wide: what lies close to its plane would leave all other receivers thousands of disparities behind it.
+    endless.reach = std::max(endless.reach, static_cast<float>(depth.camera.half_extent.length()));
+    for (const auto& [map, samples] : maps) {
+        endless.made.push_back(work.buffer<float>(samples, "depths of a directional light"));
+        work.launch(program, "depths_of_endless", {samples, 1}, {256, 1}, samples * 8, static_cast<cl_int>(samples), endless.reach, *map, endless.made.back());
+        *map = endless.made.back().memory();
+    }
+    return endless;
+}
+
 MapSize reduced_size(int width, int height, int resolution)
 {
     const int longer = std::max(width, height);
@@ -79,10 +104,11 @@ MapSize reduced_size(int width, int height, int resolution)
 
 cl_float2 joining_gap(const OccluderView& view) { return {{view.light_scale_x * view.texel_x, view.light_scale_y * view.texel_y}}; }
 
-OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size)
+OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size, float reach)
 {
-    const float scale_x = light_scale(camera.half_extent.x, light.half_u);
-    const float scale_y = light_scale(camera.half_extent.y, light.half_v);
+    const double per_disparity = reach > 0 ? static_cast<double>(reach) : 1;
+    const float scale_x = light_scale(camera.half_extent.x / per_disparity, light.half_u);
+    const float scale_y = light_scale(camera.half_extent.y / per_disparity, light.half_v);
     const float texel_x = 2.0f / static_cast<float>(size.width), texel_y = 2.0f / static_cast<float>(size.height);
     return {.width = size.width,
             .height = size.height,

@@ -42,6 +42,15 @@ struct DeviceDepth {
 };
 DeviceDepth on_device(opencl::Work& work, const Casting& casting, bool front, bool back, int layers = 0);
 
+// A directional light's maps as those of a perspective view with the disparities 2 - z / reach (kernels/occluders.cl). `depth` keeps its light and camera;
+// of any other light it is what was given, and `reach` 0. program: one that has the kernels.
+struct EndlessDepth {
+    OccluderDepth depth;
+    std::vector<opencl::Buffer<float>> made; // what `depth` refers to
+    float reach = 0;
+};
+EndlessDepth endless_depth(opencl::Work& work, const OccluderDepth& depth, const opencl::Specialisation& program);
+
 // What a technique says when its map holds nothing.
 constexpr const char* empty_map = "the occluder map is empty: nothing casts shadows";
 
@@ -59,7 +68,8 @@ MapSize reduced_size(int width, int height, int resolution);
 
 // With k (light_scale of kernels/common/shared.h) for both axes. A light of no extent counts as one so small that every back-projected
 // texel edge lies far outside it or far inside the texel: 10^18 lights across at a disparity step of 1.
-OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size);
+// reach: of a directional light, depth over which disparity changes by 1 (EndlessDepth); 0: disparity is 1 / z, or -z of a directional light.
+OccluderView occluder_view(const LightFrame& light, const Camera& camera, MapSize size, float reach = 0);
 
 // The step of disparity between two texels that lets half a texel of light through at the most, across and down: up to it they hide as one surface does.
 cl_float2 joining_gap(const OccluderView& view);

@@ -11,7 +11,7 @@ int padded(int size, int multiple) { return (size + multiple - 1) / multiple * m
 
 opencl::Specialisation receivers_program() { return {"receivers.cl", {{"TILE_ROWS", std::to_string(tile_rows)}}}; }
 
-ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view)
+ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view, float reach)
 {
     ReceiverView view{};
 
@@ -36,6 +36,7 @@ ReceiverView receiver_view(const Camera& camera, int width, int height, const Ca
     view.per_light_y = static_cast<float>(1 / light_view.half_extent.y);
     view.camera_orthographic = camera.orthographic;
     view.light_orthographic = light_view.orthographic;
+    view.light_reach = reach;
     view.width = width;
     view.height = height;
     view.stride = padded(width, TILE_WIDTH);

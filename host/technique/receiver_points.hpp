@@ -26,8 +26,8 @@ struct ReceiverPoints {
     bool is_list = false; // neighbours of a row lie together, rows need not
 };
 
-// The transform from `camera` to the space of the light's own view.
-ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view);
+// The transform from `camera` to the space of the light's own view. reach: ReceiverView::light_reach.
+ReceiverView receiver_view(const Camera& camera, int width, int height, const Camera& light_view, float reach = 0);
 
 // Launches receivers_from_depth on a depth map that is on the device. `program`: one that has the kernel.
 ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, const cl::Buffer& depth, double precision,

@@ -48,13 +48,16 @@ TechniqueRow row(const ShadowMap&)
             .defaults = ShadowMap{}};
 }
 
-PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& depth, const ShadowMap& settings)
+PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& given, const ShadowMap& settings)
 {
+    const EndlessDepth endless = endless_depth(work, given, program());
+    const OccluderDepth& depth = endless.depth;
     const MapSize size{depth.width, depth.height};
     return {.settings = settings,
             .program = program(),
-            .view = occluder_view(depth.light, depth.camera, size),
+            .view = occluder_view(depth.light, depth.camera, size, endless.reach),
             .precision = depth.precision,
+            .reach = endless.reach,
             .map = occluder_map(work, depth.front, size, size, Reduction::area, depth.precision, program())};
 }
 
@@ -92,7 +95,7 @@ PreparedShadowMap prepare(opencl::Work& work, const Casting& casting, const Shad
 
 void shade(opencl::Work& work, const PreparedShadowMap& prepared, const Receiving& receivers, Shaded& shaded)
 {
-    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program, prepared.reach);
     work.stage("shade");
     if (shaded.estimated) shaded.estimated(most_work(prepared.settings, points.view.width, points.view.height));
     shade_shadow_map(work, prepared, points, shaded.visibility);

@@ -13,6 +13,7 @@ struct PreparedShadowMap {
     opencl::Specialisation program;
     OccluderView view{};
     double precision = 0;
+    float reach = 0; // of a directional light (ReceiverView::light_reach)
     OccluderMap map;
 };
 

@@ -157,11 +157,11 @@ void shade_projected(opencl::Work& work, const PreparedSoftShadowMap& prepared, 
 {
     const int side = prepared.settings.project_resolution;
     const DepthMap from_light = receivers.from_light(side);
-    const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program);
+    const ReceiverPoints lit_points = points_of(work, from_light, receivers.view, receivers.view, prepared.program, prepared.reach);
     const auto light_mask = work.buffer<float>(from_light.depth.size(), "light-space mask");
     work.stage("shade");
     shade_estimated(work, prepared, lit_points, light_mask.memory(), shaded);
-    const ReceiverPoints points = points_of(work, receivers, prepared.program);
+    const ReceiverPoints points = points_of(work, receivers, prepared.program, prepared.reach);
     work.stage("project");
     sample_mask(work, points, light_mask.memory(), side, side, shaded.visibility, prepared.program);
 }
@@ -171,8 +171,8 @@ void check_light(const LightFrame& light, const Image* emission, const SoftShado
 {
     const bool sum = settings.visibility == PatchVisibility::sum;
     if (sum && light.shape == LightShape::disc)
-        throw Error::at(ErrorCode::invalid_input, "technique.visibility", "is sum and the light a sphere",
-                        "expected union, or a rectangle of the same area: half-edges of 0.886 times the radius");
+        throw Error::at(ErrorCode::invalid_input, "technique.visibility", light.directional ? "is sum and the light directional" : "is sum and the light a sphere",
+                        light.directional ? "expected union" : "expected union, or a rectangle of the same area: half-edges of 0.886 times the radius");
     if (sum && emission) throw Error::at(ErrorCode::invalid_input, "technique.visibility", "is sum and the light textured", "expected union");
     if (settings.project && emission) throw Error::at(ErrorCode::invalid_input, "technique.project", "is true and the light textured", "expected false");
 }
@@ -215,7 +215,7 @@ TechniqueRow row(const SoftShadowMap&)
                  integer_key<S>("project_resolution", &S::project_resolution, {1, 65536}, "pixels",
                                 "side of the light's-view mask with project"),
                  tolerance_key<S>()},
-        .lights = {"rectangle", "sphere", "point"},
+        .lights = {"rectangle", "sphere", "point", "directional"},
         .textured_lights = true,
         .inputs = "occluder depth from the light's centre: front, back or both as `sides` says (or objects that cast); receiver depth "
                   "(or objects)",
@@ -229,16 +229,19 @@ void check_together(const SoftShadowMap& settings)
                         "expected visibility sum: a union sums nothing up");
 }
 
-PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings, const Image* emission)
+PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& given, const SoftShadowMap& settings, const Image* emission)
 {
     check_together(settings);
-    check_light(depth.light, emission, settings);
+    check_light(given.light, emission, settings);
+    const EndlessDepth endless = endless_depth(work, given, program(settings, work.context().quirks().lanes));
+    const OccluderDepth& depth = endless.depth;
     const MapSize from{depth.width, depth.height};
     const MapSize size = size_of(depth, settings);
     PreparedSoftShadowMap prepared{.settings = settings,
                                    .program = program(settings, work.context().quirks().lanes),
-                                   .view = occluder_view(depth.light, depth.camera, size),
+                                   .view = occluder_view(depth.light, depth.camera, size, endless.reach),
                                    .precision = depth.precision,
+                                   .reach = endless.reach,
                                    .nearest = 0,
                                    .sides = {},
                                    .united = {}};
@@ -333,7 +336,7 @@ void shade(opencl::Work& work, const PreparedSoftShadowMap& prepared, const Rece
         shade_projected(work, prepared, receivers, shaded);
         return;
     }
-    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program);
+    const ReceiverPoints points = points_with_planes(work, receivers, prepared.program, prepared.reach);
     work.stage("shade");
     shade_estimated(work, prepared, points, shaded.visibility, shaded);
 }

@@ -21,6 +21,7 @@ struct PreparedSoftShadowMap {
     opencl::Specialisation program;
     OccluderView view{};
     double precision = 0;
+    float reach = 0;   // of a directional light (ReceiverView::light_reach)
     float nearest = 0; // greatest disparity of any side; 0: nothing casts
     std::vector<Side> sides; // of the sum
     PreparedUnion united;    // of the union

@@ -187,10 +187,11 @@ struct DeviceBuffers {
 };
 
 // Receiver points, for a technique whose `program` has the kernel. The stage "receivers" is left running, but of a caller's own depth on the device.
-ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
+// reach: ReceiverView::light_reach.
+ReceiverPoints points_of(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program, float reach = 0);
 // The same with the receivers' planes, where their normals are known.
-ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program);
+ReceiverPoints points_with_planes(opencl::Work& work, const Receiving& receivers, const opencl::Specialisation& program, float reach = 0);
 ReceiverPoints points_of(opencl::Work& work, const DepthMap& depth, const Camera& camera, const Camera& view,
-                         const opencl::Specialisation& program);
+                         const opencl::Specialisation& program, float reach = 0);
 
 } // namespace penumbra

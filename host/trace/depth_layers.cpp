@@ -127,7 +127,7 @@ TracedViews Tracer::views(const Camera& camera, int width, int height, const Vie
     TracedViews result;
     const std::vector<DepthMap*> maps = maps_of(result, request, width, height);
     if (request.normals) result.normals.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), DepthVector{0, 0, 0});
-    const bool fine = request.fine > 1 && !camera.orthographic;
+    const bool fine = request.fine > 1;
     std::vector<Outlines> outlines;
     if (fine) outlines.assign(maps.size(), Outlines(camera, width, height));
     for_each_pixel(*impl_, camera, width, height, [&](int x, int y, const std::vector<Crossing>& crossings) {

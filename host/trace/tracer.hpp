@@ -24,7 +24,7 @@ struct ViewRequest {
     // texel of the map. 0: none. Perspective cameras alone.
     int fine = 0;
     double fine_share = 4;
-    double gap = 0; // steps of 1 / depth up to which neighbouring texels show one surface, whatever lies between
+    double gap = 0; // steps of 1 / depth, of orthographic views of depth, up to which neighbouring texels show one surface, whatever lies between
 };
 
 // Of each pixel the nearest surface (front), the furthest back-facing one, whose normal points along the ray (back), and those in order of

@@ -34,6 +34,7 @@ typedef struct {
     float off_x, off_y;                     // from the viewing axis to the image's middle, right and up; in the same measure
     float per_light_x, per_light_y;         // 1 over the light's own view's tangents, or over its half extents if orthographic
     int camera_orthographic, light_orthographic;
+    float light_reach;                      // of a directional light: disparity is 2 - z / light_reach (occluders.cl); 0: 1 / z
     float depth_error;                      // scene units: by half as much as a receiver's distance from the light may be off for the camera's distance from there
     int width, height;                      // of the receiver map
     int stride, rows;                       // of the padded lists of receivers

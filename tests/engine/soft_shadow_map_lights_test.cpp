@@ -1,6 +1,7 @@
-// soft_shadow_map under textured lights, which its publication does not have.
+// soft_shadow_map under lights that its publication does not have: a directional light's disc of directions, and textures.
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -23,6 +24,10 @@ Object quad(const Vec3& center, const Vec3& half_u, const Vec3& half_v, bool cas
     return object;
 }
 
+Object floor_quad(bool casts = false) { return quad({0, 0, 0}, {4, 0, 0}, {0, 0, -4}, casts, true); }
+
+DirectionalLight sun(double diameter_deg, const Vec3& direction = {0, -1, 0}) { return {.direction = direction, .angular_diameter_deg = diameter_deg, .up = {}}; }
+
 constexpr int side = 64;
 
 Scene scene_of(const Light& light, std::vector<Object> objects)
@@ -42,6 +47,14 @@ Mask mask_of(const Scene& scene, const Technique& technique = SoftShadowMap{})
     return engine.mask(scene, technique);
 }
 
+// The share of a disc beyond a chord at `s` radii from its middle.
+double beyond(double s)
+{
+    if (s >= 1) return 0;
+    if (s <= -1) return 1;
+    return (std::acos(s) - s * std::sqrt(1 - s * s)) / std::numbers::pi;
+}
+
 // Mean over shadow samples.
 double mean_difference(const Image& a, const Image& b)
 {
@@ -54,6 +67,62 @@ double mean_difference(const Image& a, const Image& b)
     }
     EXPECT_GT(shadow, 100) << "hardly a shadow";
     return sum / std::max(shadow, 1);
+}
+
+// A half-plane under a sun overhead: the segment of the disc of tangents that its edge leaves. 32 x 32 samples tell a straight edge to 7.6/1024 of the square
+// around the disc, which has pi/4 of that; interpolation may add a tolerance of .02 more.
+TEST(SoftShadowMapLights, TheEdgeOfAHalfPlaneUnderASun)
+{
+    for (const double diameter : {5., 10., 40.}) {
+        Scene scene = scene_of(sun(diameter), {quad({-3, 1, 0}, {3, 0, 0}, {0, 0, -6}, true, false), floor_quad()});
+        scene.occluders.camera = LightCamera{.tan_half_fov = {}, .half_extent = Vec2(8, 8), .center = Vec3(0, 3, 0)}; // the edge lies between two texels
+        const double tangent = std::tan(diameter / 2 * std::numbers::pi / 180);
+        for (const double tolerance : {0., 0.02}) {
+            const Mask mask = mask_of(scene, SoftShadowMap{.tolerance = tolerance});
+            int penumbra = 0;
+            for (int y = 0; y < side; ++y)
+                for (int x = 0; x < side; ++x) {
+                    const double place = ((x + 0.5) * 2 / side - 1) * 0.4 * 6; // of the floor, which the camera sees from straight above
+                    const double expected = 1 - beyond(place / tangent);
+                    penumbra += expected > 0 && expected < 1;
+                    ASSERT_NEAR(mask.visibility.at(x, y, 0), expected, 7.6 / 1024 * 4 / std::numbers::pi + tolerance) << diameter << " degrees, pixel " << x << ", " << y;
+                }
+            EXPECT_GT(penumbra, side) << diameter;
+        }
+    }
+}
+
+TEST(SoftShadowMapLights, SunsAgreeWithRays)
+{
+    const std::vector<Object> objects{quad({0.3, 1.2, 0.2}, {0.7, 0.3, 0}, {0, 0.2, -0.6}, true, true), quad({-0.6, 0.6, -0.4}, {0.4, 0, 0}, {0, 0.3, -0.4}, true, true), floor_quad(true)};
+    for (const Vec3& direction : {Vec3(0, -1, 0), Vec3(0.4, -1, 0.3)})
+        for (const auto& [diameter, most] : {std::pair{0.53, 0.02}, std::pair{8., 0.006}, std::pair{30., 0.006}}) {
+            Scene scene = scene_of(sun(diameter, direction), objects);
+            scene.receivers.camera = PinholeCamera{.frame = {.origin = {0, 3, 4}, .x = {1, 0, 0}, .y = {0, 0.8, -0.6}, .z = {0, 0.6, 0.8}}, .tan_half_fov = {0.4, 0.4}, .shift = {}};
+            EXPECT_LT(mean_difference(mask_of(scene).visibility, mask_of(scene, RayTraced{.samples = 4096}).visibility), most) << diameter << " degrees; the smallest sun's penumbra is narrower than a texel of the map";
+        }
+}
+
+// A plane that casts, tilted, and nothing else: nothing darkens it.
+TEST(SoftShadowMapLights, ALitPlaneIsCleanUnderASun)
+{
+    for (const double tilt : {0., 0.3, 1., 3.}) {
+        const Object plane = quad({0, 0, 0}, {2, tilt, 0}, {0, 0, -2}, true, true);
+        for (const Vec3& direction : {Vec3(0, -1, 0), Vec3(-0.5, -1, 0.2)}) {
+            const Mask mask = mask_of(scene_of(sun(1, direction), {plane}));
+            const Mask rays = mask_of(scene_of(sun(1, direction), {plane}), RayTraced{.samples = 64});
+            for (std::size_t i = 0; i < mask.visibility.pixels.size(); ++i) ASSERT_EQ(mask.visibility.pixels[i], rays.visibility.pixels[i]) << "tilt " << tilt << ", pixel " << i;
+        }
+    }
+}
+
+// However far the scene's origin lies above what casts, and beyond the farthest caster.
+TEST(SoftShadowMapLights, ReceiversFarBehindWhatCasts)
+{
+    const Object caster = quad({0, 0.02, 0}, {0.5, 0, 0}, {0, 0, -0.5}, true, false);
+    Scene scene = scene_of(sun(10), {caster, floor_quad()});
+    scene.objects[1].mesh = quad({0, -20, 0}, {9, 0, 0}, {0, 0, -9}, false, true).mesh;
+    EXPECT_LT(mean_difference(mask_of(scene).visibility, mask_of(scene, RayTraced{.samples = 4096}).visibility), 0.006);
 }
 
 RectangleLight textured(int width, int height, int channels, const std::function<float(int, int, int)>& emitted)
@@ -129,6 +198,7 @@ TEST(SoftShadowMapLights, WhatASumCannotTakeIsSaid)
         return std::string();
     };
     const RectangleLight light = textured(2, 2, 1, [](int, int, int) { return 1.f; });
+    EXPECT_NE(message(sun(5), sum).find("technique.visibility: is sum and the light directional"), std::string::npos) << message(sun(5), sum);
     EXPECT_NE(message(light, sum).find("technique.visibility: is sum and the light textured"), std::string::npos) << message(light, sum);
     EXPECT_NE(message(light, {.project = true}).find("technique.project: is true and the light textured"), std::string::npos) << message(light, {.project = true});
 }

@@ -41,7 +41,7 @@ TEST(SharedStructs, ReceiverView)
 {
     const std::vector<std::string> members = {
         "light_from_camera",  "pixel_x", "pixel_y", "off_x", "off_y", "per_light_x", "per_light_y", "camera_orthographic",
-        "light_orthographic", "depth_error", "width", "height", "stride", "rows"};
+        "light_orthographic", "light_reach", "depth_error", "width", "height", "stride", "rows"};
     const std::vector<cl_int> host = {sizeof(ReceiverView),
                                       HERE(ReceiverView, light_from_camera),
                                       HERE(ReceiverView, pixel_x),
@@ -52,14 +52,15 @@ TEST(SharedStructs, ReceiverView)
                                       HERE(ReceiverView, per_light_y),
                                       HERE(ReceiverView, camera_orthographic),
                                       HERE(ReceiverView, light_orthographic),
+                                      HERE(ReceiverView, light_reach),
                                       HERE(ReceiverView, depth_error),
                                       HERE(ReceiverView, width),
                                       HERE(ReceiverView, height),
                                       HERE(ReceiverView, stride),
                                       HERE(ReceiverView, rows)};
     EXPECT_EQ(on_device(writes("ReceiverView", members), host.size()), host);
-    // Every member is listed: 12 + 7 floats and 6 ints.
-    EXPECT_EQ(sizeof(ReceiverView), 25 * 4u);
+    // Every member is listed: 12 + 8 floats and 6 ints.
+    EXPECT_EQ(sizeof(ReceiverView), 26 * 4u);
 }
 
 TEST(SharedStructs, OccluderView)
