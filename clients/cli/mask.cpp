@@ -195,6 +195,7 @@ int run(const Flags& flags)
     in_scene(flags.scene, [&] {
         MaskJob job = job_of(scene, technique);
         job.bound = !flags.bound.empty();
+        job.error_estimate = !flags.report.empty();
         engine.masks(job, {}, write);
     });
     progress.end();

@@ -8,6 +8,7 @@
 #include <penumbra/mask_job.hpp>
 
 #include "engine/depth_sources.hpp"
+#include "engine/error_estimate.hpp"
 #include "engine/geometry.hpp"
 #include "engine/state.hpp"
 #include "engine/weighted_mean.hpp"
@@ -145,6 +146,13 @@ private:
         add_stages(stages, report.stages);
         report.stages = std::move(stages);
         report.warnings.insert(report.warnings.begin(), job_.warnings.begin(), job_.warnings.end());
+        if (job_.error_estimate) {
+            before("estimating the error");
+            const Stopwatch estimating;
+            const MaskLight& light = job_.lights[index];
+            report.error_estimate = estimate_error(engine_, job_, light, at_frame(light.light, frames_of(light.light) > 0 ? frame : 0), made, seen, mask.visibility);
+            report.stages.push_back({"estimate error", estimating.ms(), 0, 0});
+        }
         report.total_ms = total.ms();
         if (frame > 0 && frames_of(job_.lights[index].light) == 0) masks_[index] = without_work(mask);
         return mask;
@@ -214,6 +222,7 @@ void add_report(Report& all, const Report& one, const std::string& name, const s
         all.stages.clear();
         all.prepare_ms = all.shade_ms = all.total_ms = 0;
         all.peak_device_bytes = all.pairs = 0;
+        all.error_estimate.reset();
         all.warnings = common;
         all.notes.clear();
     }

@@ -88,6 +88,8 @@ std::string report_json(const Report& report)
         json["receivers"] = report.receivers;
         json["receivers_shaded"] = report.receivers_shaded;
     }
+    if (const auto& estimate = report.error_estimate)
+        json["error_estimate"] = {{"mean", estimate->mean}, {"p99", estimate->p99}, {"pixels", estimate->pixels}, {"by", estimate->by}};
     json["warnings"] = report.warnings;
     if (!report.notes.empty()) json["notes"] = report.notes;
 

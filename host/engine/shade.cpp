@@ -285,6 +285,9 @@ std::vector<float> shade_on_device(opencl::Work& work, const Prepared::State& st
     return std::move(grey.pixels);
 }
 
+// Whether some of the pixels are points of the host.
+bool shades_from_host(const Prepared::State& state) { return row_of(kind_of(state.technique)).on_host || needs_of(state.technique).depth_images; }
+
 constexpr std::size_t few_receivers = 4096;
 
 // Shades coarse to fine, within the technique's tolerance.
@@ -297,7 +300,7 @@ Image shade_some(opencl::Work& work, const Prepared::State& state, const ToShade
                               .points = whole.surface ? std::span<const DepthVector>(whole.surface->points) : std::span<const DepthVector>{},
                               .normals = whole.normals ? std::span<const DepthVector>(*whole.normals) : std::span<const DepthVector>{}};
     const Needs needs = needs_of(state.technique);
-    const bool from_host = row_of(kind_of(state.technique)).on_host || needs.depth_images;
+    const bool from_host = shades_from_host(state);
     const DeviceWhole uploaded = from_host ? DeviceWhole{} : on_device(work, state, whole);
     const Receiving all = receiving(state, whole, uploaded);
     ShadeCounts counted;
@@ -330,6 +333,19 @@ void require_bounds(const Technique& technique)
 {
     if (!row_of(kind_of(technique)).bounds)
         throw Error(ErrorCode::unsupported, kind_of(technique) + " has no bounds", "depth_trace and ray_traced have");
+}
+
+std::vector<float> shade_pixels(const Prepared& prepared, const Receivers& receivers, std::span<const std::uint32_t> pixels)
+{
+    const Prepared::State& state = prepared.state();
+    const Camera camera = resolve_camera(receivers.camera, state.light, {}, receivers.width, receivers.height, "receivers.camera");
+    const std::shared_ptr<const DepthSurface> surface = surface_of(receivers, camera, state.device);
+    opencl::Work work(state.device);
+    const ToShade whole{.camera = camera, .depth = *receivers.depth, .surface = surface.get(), .normals = normals_of(receivers, surface.get())};
+    Shaded shaded{.visibility = {}, .image = {}, .counts = nullptr, .estimated = {}, .bound = nullptr};
+    if (shades_from_host(state)) return shade_on_host(work, state, whole, pixels, shaded);
+    const DeviceWhole uploaded = on_device(work, state, whole);
+    return shade_on_device(work, state, receiving(state, whole, uploaded), pixels, shaded);
 }
 
 Mask Engine::shade(const Prepared& prepared, const Receivers& receivers, bool bound) const { return shade_estimated(prepared, receivers, bound, {}); }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,9 @@ void check_light(const Light& light, const Technique& technique);
 
 // Engine::shade; `estimated`: MaskHooks::estimated.
 Mask shade_estimated(const Prepared& prepared, const Receivers& receivers, bool bound, const std::function<void(const WorkAmount&)>& estimated);
+
+// Some pixels of what Engine::shade gives (y width + x), each by itself: no tolerance leaves one to its neighbours.
+std::vector<float> shade_pixels(const Prepared& prepared, const Receivers& receivers, std::span<const std::uint32_t> pixels);
 
 // Throws unsupported for a technique that has no bounds.
 void require_bounds(const Technique& technique);

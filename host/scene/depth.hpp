@@ -1,6 +1,7 @@
 // Depth images: decoding.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,6 +11,9 @@
 #include <penumbra/scene.hpp>
 
 namespace penumbra {
+
+// Whether a pixel of planar depth shows anything.
+inline bool is_there(float depth) { return depth > 0 && std::isfinite(depth); }
 
 enum class EncodingKind { planar, radial, disparity, window, reversed_window, normalized };
 

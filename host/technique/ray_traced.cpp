@@ -7,6 +7,7 @@
 
 #include <penumbra/error.hpp>
 
+#include "scene/depth.hpp"
 #include "technique/keys.hpp"
 #include "technique/work_estimate.hpp"
 
@@ -14,8 +15,6 @@ namespace penumbra {
 namespace {
 
 constexpr WorkKind rays{"technique.samples", WorkAmount::Unit::rays, "rays"};
-
-bool is_there(float depth) { return depth > 0 && std::isfinite(depth); }
 
 // Rays for the bound do not end at what blocks them.
 int rays_a_sample(bool bound) { return bound ? 2 : 1; }

@@ -32,6 +32,15 @@ struct Stage {
 
 // What was done and what it cost. prepare_ms depends on light and occluders alone, shade_ms on the receivers; neither holds file reading
 // and writing, rendering depth from meshes, or compiling kernels: those have stages of their own.
+// How far a mask is off over its shadow (the pixels of Metrics' _shadow figures), measured at some of its pixels.
+struct ErrorEstimate {
+    double mean = 0;        // absolute
+    double p99 = 0;         // that 99 % of the pixels keep
+    std::size_t pixels = 0; // measured at
+    std::string by;         // "rays": against 1024 and more at each; "maps of a third": by what a third of the occluder maps' resolution changes, which
+                            // says nothing of surfaces that no map shows
+};
+
 struct Report {
     std::string technique;
     std::vector<std::pair<std::string, SettingValue>> settings;
@@ -42,6 +51,7 @@ struct Report {
     std::uint64_t peak_device_bytes = 0;
     std::uint64_t pairs = 0; // (occluder texel, receiver) pairs evaluated; 0 where that means nothing
     std::uint64_t receivers = 0, receivers_shaded = 0; // with a tolerance: how many there are, and how many were computed; else 0
+    std::optional<ErrorEstimate> error_estimate;       // where it was asked for and can be had: of one light's mask, not of several together
     std::vector<std::string> warnings;
     std::vector<std::string> notes; // what was built, where the technique has something to say about it
 };

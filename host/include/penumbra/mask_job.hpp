@@ -36,6 +36,7 @@ struct MaskJob {
     Technique technique;
     std::vector<std::string> warnings = {}; // of the scene: they stand in front of those of each report
     bool bound = false;                     // whether Mask::bound is wanted; an error (unsupported) where the technique has none
+    bool error_estimate = false;            // whether Report::error_estimate is wanted: some hundred thousand rays a mask
     bool combined = false;                  // whether the mask of all lights together is wanted, after theirs
 };
 
