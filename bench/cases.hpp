@@ -32,6 +32,7 @@ void smoothie_light_size(const Engine& engine); // its error over the light's si
 void image_io(const Engine& engine);            // images from and to bytes beside OpenImageIO
 void suite(const Engine& engine);               // eleven scenes by several settings and by rays, 4096-ray references
 std::vector<std::string>& suite_settings();     // those of the suite, "kind:key=value,key=value"; empty: the usual ones
+void estimates(const Engine& engine);           // Report::error_estimate of the suite's scenes beside the error that it is of
 void limits(const Engine& engine);              // the device's arithmetic and memory limits, and what the inner loop reaches
 
 // GB/s read and written by a kernel that copies 256 MiB.

@@ -39,6 +39,7 @@ constexpr Case cases[] = {
     {"occlusion_sheet", occlusion_sheet, "occlusion_texture: a tilted sheet in 4 to 64 slices"},
     {"smoothies", smoothies, "smoothie: Table 1 of its paper, beside shadow maps; its width t"},
     {"smoothie_light_size", smoothie_light_size, "smoothie: error over the light's size, beside soft_shadow_map (Fig. 8)"},
+    {"estimates", estimates, "the report's error estimates of the suite's scenes beside their errors"},
     {"suite", suite, "eleven scenes by several settings and by rays; after it: kind:key=value,key=value for these alone"},
     {"image_io", image_io, "images read and written, beside OpenImageIO"},
     {"limits", limits, "the device's limits, and what the inner loop reaches"},

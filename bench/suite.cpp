@@ -41,17 +41,6 @@ Technique technique_of(const std::string& setting)
     return technique_from(request);
 }
 
-// The ray-traced mask, from $PENUMBRA_BENCH_REFERENCES where it was kept by a run before.
-Image kept_reference(const Engine& engine, const SuiteScene& scene)
-{
-    const char* folder = std::getenv("PENUMBRA_BENCH_REFERENCES");
-    const auto file = std::filesystem::path(folder ? folder : "") / (scene.name + "_" + std::to_string(side) + ".exr");
-    if (folder && std::filesystem::exists(file)) return read_image(file);
-    const Image reference = engine.mask(scene.scene, RayTraced{.samples = reference_samples, .adaptive = true, .first_samples = 64, .seed = 4711}).visibility;
-    if (folder) write_image(file, reference);
-    return reference;
-}
-
 const std::vector<std::string> usual{
     "128@soft_shadow_map:preset=paper",
     "32@soft_shadow_map:layers=0,tolerance=0.25",
@@ -87,6 +76,17 @@ const std::vector<std::string> rival{"ray_traced:samples=16,adaptive=true,first_
 
 } // namespace
 
+// The ray-traced mask, from $PENUMBRA_BENCH_REFERENCES where it was kept by a run before.
+Image suite_reference(const Engine& engine, const SuiteScene& scene)
+{
+    const char* folder = std::getenv("PENUMBRA_BENCH_REFERENCES");
+    const auto file = std::filesystem::path(folder ? folder : "") / (scene.name + "_" + std::to_string(side) + ".exr");
+    if (folder && std::filesystem::exists(file)) return read_image(file);
+    const Image reference = engine.mask(scene.scene, RayTraced{.samples = reference_samples, .adaptive = true, .first_samples = 64, .seed = 4711}).visibility;
+    if (folder) write_image(file, reference);
+    return reference;
+}
+
 std::vector<std::string>& suite_settings()
 {
     static std::vector<std::string> settings;
@@ -103,7 +103,7 @@ void suite(const Engine& engine)
     }
     for (SuiteScene& one : suite_scenes(side, side)) {
         if (only && std::string(only).find(one.name) == std::string::npos) continue;
-        const Image reference = kept_reference(engine, one);
+        const Image reference = suite_reference(engine, one);
         for (const std::string& text : settings) {
             const Technique technique = technique_of(text);
             one.scene.occluders.width = one.scene.occluders.height = texels_of(text);

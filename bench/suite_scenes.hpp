@@ -17,4 +17,7 @@ struct SuiteScene {
 // of the casters' size, and larger than the scene. Both maps have `texels` a side.
 std::vector<SuiteScene> suite_scenes(int texels, int receivers);
 
+// The ray-traced mask of one with 512 x 512 receivers, from $PENUMBRA_BENCH_REFERENCES where it was kept by a run before.
+Image suite_reference(const Engine& engine, const SuiteScene& scene);
+
 } // namespace penumbra::bench

@@ -65,6 +65,7 @@ Json mask_answer()
              {{"ETag", header("a strong entity tag")},
               {"Server-Timing", header("stages with milliseconds")},
               {"X-Request-Id", header("the request's id")},
+              {"Penumbra-Error-Estimate", header("JSON object with mean, p99, pixels and by, as in the command line's report; with error_estimate=true, absent where there is none")},
               {"Penumbra-Warnings", header("JSON array of what was assumed or looks wrong; absent when there is nothing")}}},
             {"content", formats}};
 }
@@ -134,6 +135,10 @@ Json operation_of(const Route& route, const Options& options)
              {"description", "`bound`: instead of the mask, the lowest and the highest visibility that each pixel can have, "
                              "channels low and high, as image/x-exr; of a technique whose `bounds` is true"},
              {"schema", {{"type", "string"}, {"enum", {"mask", "bound"}}, {"default", "mask"}}}});
+        parameters.push_back({{"name", "error_estimate"},
+                              {"in", "query"},
+                              {"description", "true: the header Penumbra-Error-Estimate says how far the mask is off, measured at some of its pixels"},
+                              {"schema", {{"type", "boolean"}, {"default", false}}}});
     }
     if (route.answer == Answer::depth)
         parameters.push_back(

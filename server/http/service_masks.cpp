@@ -265,6 +265,7 @@ void Service::send_mask(Response& response, CallReply answer, const MaskFormat& 
     response.status = 200;
     response.set_header("Server-Timing", server_timing(reply.stages));
     if (!reply.warnings.empty()) response.set_header("Penumbra-Warnings", warnings_header(reply.warnings));
+    if (!reply.error_estimate.empty()) response.set_header("Penumbra-Error-Estimate", reply.error_estimate);
     response.body = std::move(reply.bytes);
     response.set_header("Content-Type", std::string(format.media_type));
 }

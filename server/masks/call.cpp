@@ -39,6 +39,7 @@ std::string text_of(const Call& call)
                         {"light", call.choice.light},
                         {"frame", call.choice.frame},
                         {"bound", call.choice.image == MaskImage::bound},
+                        {"error_estimate", call.choice.error_estimate},
                         {"format", call.format},
                         {"side", call.side},
                         {"seconds", call.seconds}});
@@ -53,7 +54,8 @@ Call call_from(std::string_view text)
             .patch_form = json.at("patch_form"),
             .choice = {.light = json.at("light"),
                        .frame = json.at("frame"),
-                       .image = json.at("bound").get<bool>() ? MaskImage::bound : MaskImage::mask},
+                       .image = json.at("bound").get<bool>() ? MaskImage::bound : MaskImage::mask,
+                       .error_estimate = json.at("error_estimate")},
             .format = json.at("format"),
             .side = json.at("side"),
             .seconds = json.at("seconds")};
@@ -77,7 +79,7 @@ std::string text_of(const CallReply& answer)
     for (const StageTime& stage : reply.stages) stages.push_back({stage.name, stage.ms});
     json["mask"] = {{"technique", reply.technique},       {"pixels", reply.pixels},       {"device_bytes", reply.device_bytes},
                     {"stages", std::move(stages)},         {"compute_ms", reply.compute_ms}, {"encode_ms", reply.encode_ms},
-                    {"warnings", cut(reply.warnings)}, {"decode_ms", answer.decode_ms}};
+                    {"warnings", cut(reply.warnings)}, {"decode_ms", answer.decode_ms},   {"error_estimate", reply.error_estimate}};
     json["size"] = {answer.width, answer.height};
     if (answer.scene)
         json["scene"] = {
@@ -107,7 +109,8 @@ CallReply reply_from(std::string_view text)
                     .stages = {},
                     .compute_ms = mask.at("compute_ms"),
                     .encode_ms = mask.at("encode_ms"),
-                    .warnings = mask.at("warnings")};
+                    .warnings = mask.at("warnings"),
+                    .error_estimate = mask.at("error_estimate")};
     for (const Json& stage : mask.at("stages")) answer.reply.stages.push_back({stage.at(0), stage.at(1)});
     answer.width = json.at("size").at(0);
     answer.height = json.at("size").at(1);

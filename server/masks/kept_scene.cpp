@@ -151,6 +151,7 @@ void KeptScene::choose(const Changes& changes, const std::vector<MaskLight>& lig
     }
     task.job.combined = task.job.lights.size() > 1;
     task.job.bound = choice.image == MaskImage::bound;
+    task.job.error_estimate = choice.error_estimate;
 }
 
 MaskTask KeptScene::task(std::string_view patch, std::span<const Part> extra, const MaskChoice& choice, const Options& options,

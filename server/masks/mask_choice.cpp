@@ -38,14 +38,17 @@ MaskChoice choice_from(const std::vector<std::pair<std::string, std::string>>& q
 {
     MaskChoice choice;
     for (const auto& [key, value] : query) {
-        if (key != "light" && key != "frame" && key != "image")
-            throw Problem(400, "query", "the query has an unknown parameter; known: light, frame, image");
+        if (key != "light" && key != "frame" && key != "image" && key != "error_estimate")
+            throw Problem(400, "query", "the query has an unknown parameter; known: light, frame, image, error_estimate");
         if (std::ranges::count(query, key, [](const auto& parameter) { return parameter.first; }) > 1)
             throw Problem(400, "query", key + ": stands twice in the query");
         if (key == "frame") {
             choice.frame = frame_number(value);
         } else if (key == "image") {
             choice.image = image_named(value);
+        } else if (key == "error_estimate") {
+            if (value != "true" && value != "false") throw Problem(400, "query", "error_estimate: is neither; expected true or false in the query");
+            choice.error_estimate = value == "true";
         } else {
             if (!is_name(value)) throw Problem(400, "no_light", "light: is no name; expected 1 to 64 of A-Z a-z 0-9 _ - in the query");
             choice.light = value;

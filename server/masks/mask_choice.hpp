@@ -1,4 +1,4 @@
-// Which of a scene's masks a request asks for, and what of it: the light, frame and image of its query.
+// Which of a scene's masks a request asks for, and what of it: the light, frame, image and error_estimate of its query.
 #pragma once
 
 #include <string>
@@ -16,10 +16,11 @@ struct MaskChoice {
     std::string light = {}; // a light's name; empty: all together, or the only one
     int frame = 0;          // of a sequence, from 1; 0: there is none
     MaskImage image = MaskImage::mask;
+    bool error_estimate = false; // Report::error_estimate is wanted
 };
 
-// From the query's parameters. Throws Problem 400 for others than light, frame and image, for one that stands twice, for what is no name,
-// no number and no image.
+// From the query's parameters. Throws Problem 400 for other parameters than these, for one that stands twice, for what is no name, no
+// number, no image and neither true nor false.
 MaskChoice choice_from(const std::vector<std::pair<std::string, std::string>>& query);
 
 // What of a light decides whether it can be chosen.

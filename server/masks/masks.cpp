@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdio>
 
+#include <nlohmann/json.hpp>
+
 #include <penumbra/error.hpp>
 #include <penumbra/scene_file.hpp>
 
@@ -21,6 +23,11 @@ std::string token_of(std::string_view name)
     std::string token;
     for (const char c : name) token += (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ? c : '-';
     return token;
+}
+
+std::string header_of(const ErrorEstimate& estimate)
+{
+    return nlohmann::ordered_json{{"mean", estimate.mean}, {"p99", estimate.p99}, {"pixels", estimate.pixels}, {"by", estimate.by}}.dump();
 }
 
 // How a mask of that scene, or its bound, is encoded in that format.
@@ -121,6 +128,7 @@ MaskTask task_of(std::span<const Part> parts, const MaskChoice& choice, const Op
     task.job.lights = std::move(chosen);
     task.job.combined = task.job.lights.size() > 1;
     task.job.bound = choice.image == MaskImage::bound;
+    task.job.error_estimate = choice.error_estimate;
     return task;
 }
 
@@ -148,6 +156,7 @@ MaskReply compute_mask(const Engine& engine, const MaskTask& task, const MaskFor
     reply.pixels = mask.visibility.pixel_count();
     reply.device_bytes = mask.report.peak_device_bytes;
     reply.warnings = mask.report.warnings;
+    if (mask.report.error_estimate) reply.error_estimate = header_of(*mask.report.error_estimate);
     for (const Stage& stage : mask.report.stages) reply.stages.push_back({token_of(stage.name), stage.ms});
     reply.stages.push_back({"encode", reply.encode_ms});
     return reply;
@@ -160,6 +169,7 @@ std::string etag_of(std::string_view device, std::string_view content, const Mas
         .add(choice.light)
         .add(std::to_string(choice.frame))
         .add(choice.image == MaskImage::bound ? "bound" : "mask")
+        .add(choice.error_estimate ? "error_estimate" : "")
         .add(format.format)
         .add(version())
         .add(device);

@@ -47,6 +47,7 @@ struct MaskReply {
     std::vector<StageTime> stages; // those of the report, encode
     double compute_ms = 0, encode_ms = 0;
     std::vector<std::string> warnings;
+    std::string error_estimate; // the header's value (Report::error_estimate); empty: there is none
 };
 
 // The part `scene`, or nothing when there is none. Throws Problem 413 when it is over the limit.

@@ -81,6 +81,22 @@ TEST(BoundOverHttp, TheLibrarysBytesInEveryWay)
     EXPECT_TRUE(ask_image("mask", all).body == mask.body);
 }
 
+// error_estimate=true: the library's, as a header; the mask stays the same.
+TEST(BoundOverHttp, AndTheErrorEstimate)
+{
+    const Parts all = seen();
+    const Reply mask = ask_at("/v1/masks", post(form(all), exr)), estimated = ask_at("/v1/masks?error_estimate=true", post(form(all), exr));
+    ASSERT_EQ(estimated.status, 200) << estimated.body;
+    EXPECT_TRUE(estimated.body == mask.body);
+    EXPECT_EQ(mask.header("Penumbra-Error-Estimate"), "");
+    EXPECT_NE(mask.header("ETag"), estimated.header("ETag"));
+    const Json found = Json::parse(estimated.header("Penumbra-Error-Estimate"));
+    EXPECT_EQ(found.at("by"), "rays");
+    EXPECT_GT(found.at("mean").get<double>(), 0);
+    EXPECT_GE(found.at("p99").get<double>(), found.at("mean").get<double>());
+    EXPECT_EQ(ask_at("/v1/masks?error_estimate=1", post(form(all), exr)).status, 400);
+}
+
 TEST(BoundOverHttp, WhatIsRefused)
 {
     const auto expect_refused = [](const Reply& reply, int status, const std::string& reason, const std::string& part) {
@@ -92,7 +108,7 @@ TEST(BoundOverHttp, WhatIsRefused)
     for (const std::string image : {"", "Bound", "bounds", "low", "mask%20"})
         expect_refused(ask_image(image, seen()), 400, "no_image", "expected mask or bound");
     expect_refused(ask_image("bound&image=mask", seen()), 400, "query", "twice");
-    expect_refused(ask_image("bound&imagine=1", seen()), 400, "query", "known: light, frame, image");
+    expect_refused(ask_image("bound&imagine=1", seen()), 400, "query", "known: light, frame, image, error_estimate");
     for (const char* accept : {"Accept: image/png\r\n", "Accept: image/x-portable-floatmap, image/x-exr;q=0\r\n"})
         expect_refused(ask_image("bound", seen(), accept), 406, "not_acceptable", "image/x-exr");
     // As the library says it, before anything is computed.
