@@ -167,7 +167,7 @@ cl::Kernel Work::kernel(const Specialisation& specialisation, const char* name)
     const auto same = [&](const OwnKernel& one) { return one.name == name && one.file == specialisation.file && one.constants == specialisation.constants; };
     const auto at = std::find_if(kernels_.begin(), kernels_.end(), same);
     if (at != kernels_.end()) return at->kernel;
-    return kernels_.emplace_back(specialisation.file, name, specialisation.constants, context().kernel(specialisation, name, compile_ms_)).kernel;
+    return kernels_.emplace_back(OwnKernel{specialisation.file, name, specialisation.constants, context().kernel(specialisation, name, compile_ms_)}).kernel;
 }
 
 Work::StopBuffer::~StopBuffer()

@@ -13,6 +13,7 @@
 #include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <penumbra/error.hpp>
 
@@ -20,8 +21,6 @@
 #include "process/problem.hpp"
 #include "process/wait.hpp"
 #include "process/watch.hpp"
-
-extern char** environ;
 
 namespace penumbra::server {
 namespace {
@@ -385,7 +384,7 @@ Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, 
         end = std::min(end, now + std::chrono::milliseconds(100)); // the service's end is looked for now and then: it shortens the wait
         if (step != steps_down.end()) {
             const auto left = step->after - (processor_time(worker_->process) - used_before);
-            if (left <= left.zero()) {
+            if (left <= Clock::duration::zero()) {
                 lower_priority(worker_->process, step++->steps);
                 lowered_ = true;
             } else {
