@@ -151,6 +151,7 @@ private:
     template <class T> static std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places)
     {
         std::vector<T> result;
+        result.reserve(places.size());
         for (const std::size_t place : places) result.push_back(all[place]);
         return result;
     }

@@ -95,6 +95,7 @@ Scene decode_scene(std::span<const Part> parts, const Options& options, const De
 std::vector<std::size_t> chosen_from(const std::vector<MaskLight>& lights, const MaskChoice& choice)
 {
     std::vector<Choosable> choosable;
+    choosable.reserve(lights.size());
     for (const MaskLight& light : lights) choosable.push_back({light.name, static_cast<int>(frames_of(light.light))});
     return chosen_from(choosable, choice);
 }

@@ -247,6 +247,7 @@ void WorkerPool::spawn(Worker& worker, bool builder)
     std::vector<std::string> words{options_.program, (builder ? "--builder=" : "--worker=") + folder};
     words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
     std::vector<char*> pointers;
+    pointers.reserve(words.size() + 1);
     for (std::string& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);
     // dup2 to itself would leave it to be closed at exec.
