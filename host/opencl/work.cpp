@@ -246,8 +246,7 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::lent(const void* data, std::s
     // Nobody writes there: OpenCL has no pointer to const.
     return translated("memory lent to kernels", [&] {
         cl::Buffer memory(context_->context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, bytes, const_cast<void*>(data));
-        const cl::CommandQueue queue = queue_;
-        std::shared_ptr<void> guard(nullptr, [queue](void*) {
+        std::shared_ptr<void> guard(nullptr, [queue = queue_](void*) {
             try {
                 queue.finish();
             } catch (...) {
