@@ -25,9 +25,11 @@ void use_huge_pages()
     // Make the heap grow its first step, then ask for huge pages in what is not yet touched.
     void* const grown = std::malloc(1 << 20);
     const auto first = (reinterpret_cast<std::uintptr_t>(grown) + huge_page - 1) / huge_page * huge_page;
-    const auto end = reinterpret_cast<std::uintptr_t>(sbrk(0)) / huge_page * huge_page;
+    char* const top = static_cast<char*>(sbrk(0));
+    const auto top_address = reinterpret_cast<std::uintptr_t>(top);
+    const auto end = top_address / huge_page * huge_page;
     std::free(grown);
-    if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
+    if (first < end) madvise(top - (top_address - first), end - first, MADV_HUGEPAGE);
 }
 
 } // namespace penumbra::cli

@@ -8,10 +8,9 @@
 
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <penumbra/error.hpp>
-
-extern char** environ;
 
 namespace penumbra::cli {
 namespace {
@@ -35,6 +34,7 @@ int run_isolated(const std::vector<std::string>& arguments)
     std::vector<std::string> words{"penumbra"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> pointers;
+    pointers.reserve(words.size() + 1);
     for (std::string& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);
     pid_t process = 0;

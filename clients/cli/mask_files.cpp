@@ -67,7 +67,7 @@ std::vector<MaskFile> mask_files(const std::string& output, const json& scene, c
         frames = std::max(frames, frames_in(list[i]));
         if (choice.light.empty()) names.push_back(lights[i].name);
     }
-    names.push_back({});
+    names.emplace_back();
     const bool sequence = frames > 0 && choice.frame == 0;
 
     std::vector<MaskFile> files;

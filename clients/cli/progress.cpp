@@ -8,7 +8,7 @@ using Clock = std::chrono::steady_clock;
 
 Progress::Progress() : since_(Clock::now())
 {
-    if (on_terminal()) watcher_ = std::jthread([this](std::stop_token stop) { watch(std::move(stop)); });
+    if (on_terminal()) watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
 Progress::~Progress() { end(); }
@@ -28,7 +28,7 @@ void Progress::step(std::string what)
     since_ = Clock::now();
 }
 
-void Progress::watch(std::stop_token stop)
+void Progress::watch(const std::stop_token& stop)
 {
     std::unique_lock lock(mutex_);
     std::string drawn;

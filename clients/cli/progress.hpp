@@ -22,7 +22,7 @@ public:
     void end();
 
 private:
-    void watch(std::stop_token stop);
+    void watch(const std::stop_token& stop);
 
     std::mutex mutex_;
     std::condition_variable_any changed_;

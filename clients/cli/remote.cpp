@@ -50,7 +50,7 @@ void apply_flags(nlohmann::json& scene, const TechniqueFlags& flags)
     if (const auto technique = JsonObject(JsonValue(scene, {})).find("technique")) request = parse_technique(*technique);
     request = apply(std::move(request), flags);
     nlohmann::json& technique = scene["technique"] = {{"kind", request.kind}};
-    for (const auto& [name, value] : request.settings) std::visit([&](const auto& held) { technique[name] = held; }, value);
+    for (const auto& setting : request.settings) std::visit([&](const auto& held) { technique[setting.first] = held; }, setting.second);
 }
 
 client::SceneFile read_for_upload(const RemoteScene& asked)

@@ -40,7 +40,7 @@ void distances_along(std::vector<float>& line, std::vector<int>& vertex, std::ve
     const int last = k;
     k = 0;
     for (int q = 0; q < n; ++q) {
-        while (k < last && border[static_cast<std::size_t>(k + 1)] < static_cast<float>(q)) ++k;
+        while (k < last && border[static_cast<std::size_t>(k) + 1] < static_cast<float>(q)) ++k;
         const int v = vertex[static_cast<std::size_t>(k)];
         result[static_cast<std::size_t>(q)] = static_cast<float>(q - v) * static_cast<float>(q - v) + line[static_cast<std::size_t>(v)];
     }

@@ -8,8 +8,8 @@
 namespace penumbra {
 
 Engine::Engine() : Engine(std::string()) {}
-Engine::Engine(const std::string& selector) : impl_(std::make_unique<Impl>(std::make_shared<const opencl::LateContext>(selector))) {}
-Engine::Engine(cl_context context, cl_device_id device) : impl_(std::make_unique<Impl>(std::make_shared<const opencl::LateContext>(opencl::Context::wrap(context, device)))) {}
+Engine::Engine(const std::string& selector) : impl_(std::make_unique<Impl>(Impl{std::make_shared<const opencl::LateContext>(selector)})) {}
+Engine::Engine(cl_context context, cl_device_id device) : impl_(std::make_unique<Impl>(Impl{std::make_shared<const opencl::LateContext>(opencl::Context::wrap(context, device))})) {}
 Engine::~Engine() = default;
 Engine::Engine(Engine&&) noexcept = default;
 Engine& Engine::operator=(Engine&&) noexcept = default;

@@ -112,7 +112,8 @@ private:
     // The receivers with their depth; the first light renders it where it is missing.
     const Receivers& receivers(const Light& light, const std::shared_ptr<const opencl::LateContext>& device, std::vector<Stage>& stages)
     {
-        if (receivers_ || (receivers_ = keeper_.receivers())) return *receivers_;
+        if (!receivers_) receivers_ = keeper_.receivers();
+        if (receivers_) return *receivers_;
         before("the receivers' depth");
         const Stopwatch watch;
         Receivers complete = receivers_with_depth(*job_.receivers, light, job_.geometry, device);
@@ -254,12 +255,14 @@ MaskJob job_of(Scene&& scene, const Technique& technique)
     validate_lights(scene);
     const Vec3 near = first_origin(scene);
     const bool combined = !scene.lights.empty();
-    return {.lights = list_of_lights(std::move(scene)),
-            .receivers = std::make_shared<const Receivers>(std::move(scene.receivers)),
-            .geometry = Geometry(std::move(scene.objects), near),
-            .technique = technique,
-            .warnings = std::move(scene.warnings),
-            .combined = combined};
+    MaskJob job{.lights = {},
+                .receivers = std::make_shared<const Receivers>(std::move(scene.receivers)),
+                .geometry = Geometry(std::move(scene.objects), near),
+                .technique = technique,
+                .warnings = std::move(scene.warnings),
+                .combined = combined};
+    job.lights = list_of_lights(std::move(scene)); // what is left of it
+    return job;
 }
 
 namespace {

@@ -151,6 +151,7 @@ private:
     template <class T> static std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places)
     {
         std::vector<T> result;
+        result.reserve(places.size());
         for (const std::size_t place : places) result.push_back(all[place]);
         return result;
     }
@@ -314,13 +315,13 @@ Prepared Engine::prepare(const Scene& scene, const Technique& technique) const
     return prepare(scene.light, scene.occluders, view_of(scene), technique, &scene.receivers);
 }
 
-Prepared Engine::prepare(const Light& light, const Occluders& given, const Geometry& geometry, const Technique& technique,
+Prepared Engine::prepare(const Light& light, const Occluders& occluders, const Geometry& geometry, const Technique& technique,
                          const Receivers* receivers) const
 {
     auto state = new_state(impl_->device, light, technique);
     Needs needs = needs_of(technique);
     const Geometry::State& objects = geometry.state();
-    check_casters(needs, objects.any(&Object::casts), given, kind_of(technique));
+    check_casters(needs, objects.any(&Object::casts), occluders, kind_of(technique));
     // Depth images that cast stand for themselves, or the light's view of everything stands for them and the meshes beside them.
     const bool seen = objects.any_seen(&Object::casts);
     const bool by_view = seen && !needs.depth_images, or_front = needs.casters == Needs::Casters::or_front;
@@ -348,11 +349,11 @@ Prepared Engine::prepare(const Light& light, const Occluders& given, const Geome
     Occluders complete;
     if (maps) {
         const Stopwatch watch;
-        complete = occluders_with_depth(light, given, geometry, needs, left_out, state->device);
+        complete = occluders_with_depth(light, occluders, geometry, needs, left_out, state->device);
         state->stages.push_back({"render depth", watch.ms(), 0, 0});
     }
     const bool shown = casting.meshes.empty() && or_front && (by_view || casting.images.empty());
-    if (maps || shown) casting.depth = depth_of(light, maps ? complete : given, geometry.objects(), needs, left_out, shown);
+    if (maps || shown) casting.depth = depth_of(light, maps ? complete : occluders, geometry.objects(), needs, left_out, shown);
 
     prepare_technique(*state, casting);
     if (needs.tolerance > 0) add_field(*state, casting, geometry, left_out);

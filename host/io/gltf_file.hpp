@@ -39,9 +39,9 @@ struct GltfFile {
 GltfFile open_gltf(std::span<const std::byte> bytes, const MeshSource& source);
 
 // The bytes of a view; throws unless they lie in its buffer.
-std::span<const std::byte> view_bytes(const GltfFile& file, int view);
+std::span<const std::byte> view_bytes(const GltfFile& file, int index);
 
 // The file's bytes of one of its images.
-Bytes image_bytes(const GltfFile& file, int image);
+Bytes image_bytes(const GltfFile& file, int index);
 
 } // namespace penumbra

@@ -17,7 +17,7 @@ public:
     std::size_t blended() const { return blended_; } // parts of alphaMode BLEND
 
 private:
-    std::uint32_t cut_of(int material);
+    std::uint32_t cut_of(int index);
 
     const GltfFile& file_;
     PolygonSoup& soup_;

@@ -18,7 +18,7 @@ struct GltfNodes {
 // Throws invalid_input for nodes that are their own ancestors or have two parents.
 GltfNodes read_nodes(const GltfFile& file);
 
-// The places of a node's mesh: the node's own, or with EXT_mesh_gpu_instancing those of all instances.
-std::vector<Imath::M44d> places_of(const GltfFile& file, int node, const Imath::M44d& world);
+// The places of the mesh of node `index`: the node's own, or with EXT_mesh_gpu_instancing those of all instances.
+std::vector<Imath::M44d> places_of(const GltfFile& file, int index, const Imath::M44d& world);
 
 } // namespace penumbra

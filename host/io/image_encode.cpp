@@ -110,6 +110,7 @@ std::vector<std::byte> encode_image(const Image& image, const OutputFormat& requ
     static constexpr const char *grey[] = {"Y", "A"}, *colours[] = {"R", "G", "B", "A"};
     if (format.channels.size() == static_cast<std::size_t>(image.channels)) {
         std::vector<const char*> names;
+        names.reserve(format.channels.size());
         for (const std::string& name : format.channels) names.push_back(name.c_str());
         return encode_exr(image, format.bits, names);
     }

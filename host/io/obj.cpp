@@ -107,7 +107,8 @@ private:
             if (!textured) continue;
             const std::string_view second = word.substr(std::min(slash + 1, word.size()));
             const std::string_view vt = second.substr(0, second.find('/'));
-            if ((textured = !vt.empty())) mapped_.push_back(mapped(texture_[index(vt, texture_.size(), "texture coordinate")]));
+            textured = !vt.empty();
+            if (textured) mapped_.push_back(mapped(texture_[index(vt, texture_.size(), "texture coordinate")]));
         }
         soup_.add(corners_, textured ? cut_ : not_cut, mapped_);
     }

@@ -62,7 +62,7 @@ Image decode_pfm(std::span<const std::byte> bytes, std::string_view where, std::
     const std::size_t row = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.channels);
     const std::size_t expected = row * static_cast<std::size_t>(image.height) * sizeof(float);
     // A header in the lines of Windows ends in CR LF. Samples may begin with what is LF, so the size has to allow for it.
-    if (rest.size() > expected && rest.data()[-1] == '\r' && rest.front() == '\n') rest.remove_prefix(1);
+    if (rest.size() > expected && *(rest.data() - 1) == '\r' && rest.front() == '\n') rest.remove_prefix(1);
     if (rest.size() < expected)
         throw fail("is truncated: " + std::to_string(rest.size()) + " bytes of samples, expected " + std::to_string(expected));
 

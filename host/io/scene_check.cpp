@@ -109,6 +109,7 @@ JsonObject checked(const JsonValue& value, const Form& form)
 {
     JsonObject section(value);
     std::vector<std::string_view> known;
+    known.reserve(form.keys.size());
     for (const Key& key : form.keys) known.push_back(key.name);
     section.allow_only(known, form.of);
     for (const Key& key : form.keys) {

@@ -36,7 +36,8 @@ std::optional<std::vector<std::byte>> base64(std::string_view text)
         const int digit = base64_digit(c);
         if (digit < 0) return std::nullopt;
         bits = bits << 6 | static_cast<std::uint32_t>(digit);
-        if ((count += 6) < 8) continue;
+        count += 6;
+        if (count < 8) continue;
         count -= 8;
         bytes.push_back(static_cast<std::byte>(bits >> count & 0xff));
     }

@@ -51,7 +51,7 @@ std::string not_for_code(const std::string& path)
 
 std::string cache_folder()
 {
-    if (const std::string own = variable("PENUMBRA_CACHE_DIR"); !own.empty()) return own;
+    if (std::string own = variable("PENUMBRA_CACHE_DIR"); !own.empty()) return own;
     if (const std::string xdg = variable("XDG_CACHE_HOME"); !xdg.empty()) return xdg + "/penumbra";
     if (const std::string home = variable("HOME"); !home.empty()) return home + "/.cache/penumbra";
     return {};

@@ -22,7 +22,7 @@ std::int64_t nanoseconds(const timespec& time);
 std::optional<std::string> content_of(const std::string& path);
 
 CachedFile cached_file(std::string_view content, const struct stat& status);
-std::uint64_t hash_of(std::string_view content);
+std::uint64_t hash_of(std::string_view bytes);
 
 // Whether a file of which nothing is known looks like what its name says, and whole: LLVM's bitcode, or a library up to its last section.
 bool looks_sound(const std::string& path);

@@ -107,7 +107,7 @@ template <class Take> void walk_below(int folder, const std::string& prefix, int
         struct stat status = {};
         if (fstatat(dirfd(entries), entry->d_name, &status, AT_SYMLINK_NOFOLLOW) != 0) continue; // gone meanwhile
         // No folder of PoCL's has a file's name: one that has stands in the way of the file, even an empty one.
-        const bool in_the_way = name.find('.') != name.npos || name == "last_accessed";
+        const bool in_the_way = name.find('.') != std::string_view::npos || name == "last_accessed";
         if (S_ISDIR(status.st_mode) && depth < 6 && !in_the_way)
             walk_below(openat(dirfd(entries), entry->d_name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW), path + '/', depth + 1, take);
         else

@@ -94,7 +94,7 @@ Error device_error(const cl::Error& error, std::string_view where, std::string h
 std::string bytes_text(unsigned long long bytes)
 {
     constexpr std::array units = {"KiB", "MiB", "GiB", "TiB", "PiB", "EiB"};
-    const std::string exact = std::to_string(bytes) + " bytes";
+    std::string exact = std::to_string(bytes) + " bytes";
     if (bytes < 1024) return exact;
 
     double value = static_cast<double>(bytes) / 1024.0;

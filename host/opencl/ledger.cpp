@@ -62,7 +62,7 @@ std::uint64_t Ledger::live() const
 void Ledger::watch(const MemoryMeter* owner, GuardedBuffer buffer)
 {
     const std::lock_guard lock(mutex_);
-    const cl_mem key = buffer.memory();
+    cl_mem key = buffer.memory();
     watched_.insert_or_assign(key, Watched{owner, std::move(buffer)});
 }
 

@@ -12,6 +12,8 @@
 namespace penumbra::opencl {
 namespace {
 
+// __extension__, for -Wpedantic, may stand before a typedef alone.
+// NOLINTNEXTLINE(modernize-use-using)
 __extension__ typedef unsigned __int128 uint128;
 
 struct Header {

@@ -167,7 +167,7 @@ cl::Kernel Work::kernel(const Specialisation& specialisation, const char* name)
     const auto same = [&](const OwnKernel& one) { return one.name == name && one.file == specialisation.file && one.constants == specialisation.constants; };
     const auto at = std::find_if(kernels_.begin(), kernels_.end(), same);
     if (at != kernels_.end()) return at->kernel;
-    return kernels_.emplace_back(specialisation.file, name, specialisation.constants, context().kernel(specialisation, name, compile_ms_)).kernel;
+    return kernels_.emplace_back(OwnKernel{specialisation.file, name, specialisation.constants, context().kernel(specialisation, name, compile_ms_)}).kernel;
 }
 
 Work::StopBuffer::~StopBuffer()
@@ -246,8 +246,7 @@ std::pair<cl::Buffer, std::shared_ptr<void>> Work::lent(const void* data, std::s
     // Nobody writes there: OpenCL has no pointer to const.
     return translated("memory lent to kernels", [&] {
         cl::Buffer memory(context_->context(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, bytes, const_cast<void*>(data));
-        const cl::CommandQueue queue = queue_;
-        std::shared_ptr<void> guard(nullptr, [queue](void*) {
+        std::shared_ptr<void> guard(nullptr, [queue = queue_](void*) {
             try {
                 queue.finish();
             } catch (...) {

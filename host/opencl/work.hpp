@@ -199,10 +199,14 @@ private:
     bool own_queue_ = true, profiled_ = true;
     // The word as the device reads it, until nothing runs that may.
     struct StopBuffer {
+        StopBuffer(std::shared_ptr<StopWord> asked, cl::Buffer seen, cl::CommandQueue used)
+            : word(std::move(asked)), memory(std::move(seen)), queue(std::move(used))
+        {
+        }
+        ~StopBuffer();
         std::shared_ptr<StopWord> word;
         cl::Buffer memory;
         cl::CommandQueue queue;
-        ~StopBuffer();
     };
     std::shared_ptr<StopWord> stop_ = current_stop();
     std::unique_ptr<StopBuffer> stop_buffer_;

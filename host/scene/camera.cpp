@@ -29,8 +29,10 @@ double most_of(std::vector<Weighted>& tangents)
     double left = 0;
     for (const Weighted& one : tangents) left += one.weight;
     left *= .995;
-    for (const Weighted& one : tangents)
-        if ((left -= one.weight) <= 0) return one.tangent;
+    for (const Weighted& one : tangents) {
+        left -= one.weight;
+        if (left <= 0) return one.tangent;
+    }
     return tangents.back().tangent;
 }
 

@@ -69,7 +69,7 @@ DepthEncoding solved(const DepthEncoding& encoding, const RawDepth& raw, const s
 // message starting with `where`: near and far missing, not finite or not 0 < near < far (normalized: any two that differ); 8-bit samples of
 // lengths; a decoded depth that is not positive; no depth but values of the other sign. Adds warnings (half-float, 8-bit, values of the other
 // sign, disparities beyond infinity). Takes the samples: planar depth stays in their memory.
-DepthMap decode_depth(RawDepth raw, const DepthEncoding& encoding, const Vec2& half_extent, std::string_view where,
+DepthMap decode_depth(RawDepth raw, const DepthEncoding& given, const Vec2& half_extent, std::string_view where,
                       std::vector<std::string>& warnings, const Vec2& center = {0, 0});
 
 } // namespace penumbra

@@ -80,6 +80,7 @@ std::vector<Ground> planes_of(const TriangleMesh& mesh, const Extremes& extremes
         if (area > plane.largest) plane = {plane.area, area, {normal, offset}};
     }
     std::vector<Plane> sorted;
+    sorted.reserve(bins.size());
     for (const auto& [key, plane] : bins) sorted.push_back(plane);
     std::stable_sort(sorted.begin(), sorted.end(), [](const Plane& a, const Plane& b) { return a.area > b.area; });
     std::vector<Ground> planes;

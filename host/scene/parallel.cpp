@@ -54,10 +54,9 @@ void parallel_for(int count, const std::function<void(int)>& body)
     std::atomic<int> next{0};
     std::mutex guard;
     std::exception_ptr first;
-    const std::shared_ptr<StopWord> stop = current_stop();
 
     // Every thread takes the next index until none is left or one of them has failed.
-    const auto work = [&] {
+    const auto work = [&, stop = current_stop()] {
         const StopScope scope(stop);
         for (int i = next.fetch_add(1); i < count; i = next.fetch_add(1)) {
             try {

@@ -11,6 +11,7 @@ opencl::Buffer<float> coverage_table(opencl::Work& work, const opencl::Specialis
     // Before rounding, for the largest row sum to be 1.
     const double most = *std::max_element(sums.sums.begin(), sums.sums.end());
     std::vector<float> rows;
+    rows.reserve(sums.sums.size());
     for (const double sum : sums.sums) rows.push_back(static_cast<float>(sum / most));
     cl_float4 per_total{{0, 0, 0, 0}};
     for (std::size_t c = 0; c < channels; ++c) per_total.s[c] = part.light[c] > 0 ? static_cast<float>(most / part.light[c]) : 0.0F;

@@ -171,6 +171,7 @@ PreparedDepthTrace prepare(opencl::Work& work, const Casting& casting, const Dep
 {
     findings.view = casting.depth.camera;
     std::vector<DeviceDepthImage> images;
+    images.reserve(casting.images.size() + 1);
     for (const auto& image : casting.images) images.push_back(on_device(work, *image));
     if (casting.depth.front) {
         work.stage("fit depth");
@@ -184,6 +185,7 @@ PreparedDepthTrace prepare(opencl::Work& work, const Casting& casting, const Dep
     const int samples = flat_x && flat_y ? 1 : settings.samples;
     const Strata strata = make_strata(samples, flat_x, flat_y);
     std::vector<cl_float2> corners;
+    corners.reserve(static_cast<std::size_t>(samples));
     for (int i = 0; i < samples; ++i) corners.push_back({{strata.low_x[static_cast<std::size_t>(i)], strata.low_y[static_cast<std::size_t>(i)]}});
     return {.settings = settings,
             .program = depth_trace_program(work.context().quirks().lanes),

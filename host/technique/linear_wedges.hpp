@@ -36,10 +36,10 @@ struct LinearWedges {
 //
 // An edge is left out where rounding decides about its normal: it points at the light's centre (8). Its neighbours then meet as above.
 //
-// `corner_wedges`: at a corner whose edges enclose less than a right angle, seen from the light, round up n (90 - angle) / 90 wedges turn
+// `most_at_corners`: at a corner whose edges enclose less than a right angle, seen from the light, round up n (90 - angle) / 90 wedges turn
 // from one normal to the next in equal steps (Fig. 7).
 LinearWedges linear_wedges(const Topology& topology, Silhouette silhouette, const LightFrame& light, const LightPart& part, bool smooth,
-                           int corner_wedges);
+                           int most_at_corners);
 
 // The planes in the order of the wedge data's edges, padding between.
 std::vector<float> planes_in_order(const LinearWedges& wedges, const WedgeData& data);

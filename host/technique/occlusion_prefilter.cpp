@@ -19,6 +19,7 @@ LevelLayout layout_of(const MarkedSlices& marked, LevelKind kind)
     const std::uint64_t side = static_cast<std::uint64_t>(marked.view.width);
     if (kind == LevelKind::table) return {.levels = {}, .textures = {}, .elements = marked.planes.size() * (side + 1) * (side + 1)};
     std::vector<int> levels;
+    levels.reserve(marked.planes.size());
     for (const OcclusionPlane& plane : marked.planes) levels.push_back(plane.levels);
     return level_layout(levels, marked.view.width, kind);
 }

@@ -179,11 +179,11 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
     }
     const SliceScenery scenery = slice_scenery(work, frame, meshes, solid, settings, receivers_cast);
     if (scenery.depths.empty()) {
-        prepared.warnings.push_back("nothing that casts lies before the light: nothing casts shadows");
+        prepared.warnings.emplace_back("nothing that casts lies before the light: nothing casts shadows");
         return prepared;
     }
     if (scenery.range.near == scenery.range.far)
-        prepared.warnings.push_back("all that casts lies in one plane parallel to the light: one slice holds it");
+        prepared.warnings.emplace_back("all that casts lies in one plane parallel to the light: one slice holds it");
     if (scenery.casters.left_out > 0)
         prepared.warnings.push_back(std::to_string(scenery.casters.left_out) +
                                     " triangles with vertices that are not finite were left out");
@@ -191,11 +191,12 @@ PreparedOcclusionTexture prepare_occlusion_texture(opencl::Work& work, const Lig
         prepared.warnings.push_back(std::to_string(scenery.range.cut) + " triangles reach nearer to the light's plane than " +
                                     std::to_string(scenery.range.near) + ": what is nearer casts nothing");
     const int splits = frame.half_u > 0 || frame.half_v > 0 ? settings.light_splits : 1;
+    const int parts = splits * splits;
     float before = 0; // as the device adds the shares up; the last one makes them 1 to the bit
     for (const SlicePart& part : slice_parts(frame, splits)) {
         std::string note;
-        const bool last = prepared.parts.size() + 1 == static_cast<std::size_t>(splits * splits);
-        const float share = last ? 1 - before : 1.0F / static_cast<float>(splits * splits);
+        const bool last = prepared.parts.size() + 1 == static_cast<std::size_t>(parts);
+        const float share = last ? 1 - before : 1.0F / static_cast<float>(parts);
         before += share;
         prepared.parts.push_back(part_of(work, prepared.program, scenery, part, share, settings, note));
         prepared.parts.back().light.first = prepared.parts.size() == 1;
@@ -238,7 +239,7 @@ PreparedOcclusionTexture prepare(opencl::Work& work, const Casting& casting, con
         for (const TriangleMesh& mesh : surfaces) meshes.push_back(&mesh);
     }
     std::optional<SolidMaps> solid;
-    if (casting.meshes.empty() && maps.back) solid.emplace(*maps.front, *maps.back, maps.camera);
+    if (casting.meshes.empty() && maps.back) solid.emplace(SolidMaps{*maps.front, *maps.back, maps.camera});
 
     PreparedOcclusionTexture prepared = prepare_occlusion_texture(work, casting.light, meshes, solid ? &*solid : nullptr, settings, casting.receivers_cast);
     findings.view = prepared.view;

@@ -34,7 +34,7 @@ ReceiverPoints receiver_points(opencl::Work& work, const ReceiverView& view, con
                                const opencl::Specialisation& program = receivers_program());
 
 // The same of points in the camera's coordinates, [view.height][view.width]; z = 0: no receiver.
-ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& points, double precision,
+ReceiverPoints lifted_receiver_points(opencl::Work& work, const ReceiverView& view, const opencl::Buffer<DepthVector>& lifted, double precision,
                                       const opencl::Specialisation& program = receivers_program());
 
 // Some pixels of an image on the device, as a list of its own: TILE_WIDTH a row, rows of whole tiles, what is left of the last ones empty.

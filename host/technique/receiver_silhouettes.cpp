@@ -259,6 +259,7 @@ public:
         }
         add_groups(edges, smooth, SpatialOrder<6>(std::move(keys)).get());
         std::vector<std::array<float, 3>> places;
+        places.reserve(always.size());
         for (const std::uint32_t i : always) places.push_back(key_of(all_.points[edges[i].low], all_.points[edges[i].high]));
         add_groups(edges, always, SpatialOrder<3>(std::move(places)).get());
         data_.edge_count = edges.size();

@@ -174,7 +174,7 @@ std::vector<std::string> linear_warnings(const LightFrame& frame, const Prepared
 {
     std::vector<std::string> warnings;
     if (frame.shape != LightShape::disc)
-        warnings.push_back("linear coverage takes the rectangle for the sphere around it: penumbrae are as wide as of that sphere");
+        warnings.emplace_back("linear coverage takes the rectangle for the sphere around it: penumbrae are as wide as of that sphere");
     if (left_out > 0)
         warnings.push_back(std::to_string(left_out) + " of " + std::to_string(prepared.edges) +
                            " silhouette edges point at the light's centre and have no wedge");
@@ -244,6 +244,7 @@ Topology topology_of_maps(const LightDepth& maps, Silhouettes silhouettes)
     if (silhouettes == Silhouettes::centre) used.layers = {};
     const std::vector<TriangleMesh> meshes = surfaces_of(used, false);
     std::vector<const TriangleMesh*> pointers;
+    pointers.reserve(meshes.size());
     for (const TriangleMesh& mesh : meshes) pointers.push_back(&mesh);
     return Topology(pointers);
 }

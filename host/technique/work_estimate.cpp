@@ -11,6 +11,7 @@ std::vector<int> spread_numbers(int columns, int rows, int count)
     constexpr double step_x = 0.7548776662466927, step_y = 0.5698402909980532;
     const auto place = [](double step, int k, int size) { return std::min(static_cast<int>(std::fmod(0.5 + step * k, 1.0) * size), size - 1); };
     std::vector<int> numbers;
+    numbers.reserve(static_cast<std::size_t>(count));
     for (int k = 0; k < count; ++k) numbers.push_back(place(step_y, k, rows) * columns + place(step_x, k, columns));
     return numbers;
 }

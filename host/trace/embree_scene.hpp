@@ -28,7 +28,7 @@ constexpr double float_rounding = 0x1p-24;
 constexpr double root3 = 1.7320508075688772;
 
 struct Tracer::Impl {
-    Impl(std::span<const TriangleMesh* const> meshes, const Vec3& origin);
+    Impl(std::span<const TriangleMesh* const> meshes, const Vec3& at);
     ~Impl();
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;

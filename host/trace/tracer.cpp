@@ -180,7 +180,7 @@ void Tracer::Impl::build()
         rtcReleaseGeometry(geometry);
     }
     // Embree leaves off building where it is told to.
-    const std::shared_ptr<StopWord> stop = current_stop();
+    const std::shared_ptr<StopWord>& stop = current_stop();
     if (stop)
         rtcSetSceneProgressMonitorFunction(scene, [](void* word, double) { return static_cast<const StopWord*>(word)->asked == 0; }, stop.get());
     rtcCommitScene(scene);

@@ -106,10 +106,12 @@ ssize_t Connection::read(char* to, size_t size)
     if (from_ == buffer_.size() && !fill()) return ended_ ? 0 : -1;
     if (in_body_ && late()) return -1;
     const std::size_t count = take_buffered(to, size);
-    if (in_body_)
+    if (in_body_) {
         count_body(count);
-    else if ((header_bytes_ += count) > lobby_.limits().header_bytes)
-        return -1;
+    } else {
+        header_bytes_ += count;
+        if (header_bytes_ > lobby_.limits().header_bytes) return -1;
+    }
     return static_cast<ssize_t>(count);
 }
 

@@ -143,7 +143,7 @@ void Lobby::run()
     }
 }
 
-void Lobby::wake() { eventfd_write(wake_, 1); }
+void Lobby::wake() const { eventfd_write(wake_, 1); }
 
 Lobby::Clock::time_point Lobby::end_of(const Guest& guest) const { return std::min(end_.load(), end_of_phase(guest)); }
 
@@ -225,7 +225,8 @@ void Lobby::forget(Guests::iterator guest)
     std::array<char, 65536> buffer;
     const ssize_t got = ::recv(guest->first, buffer.data(), buffer.size(), MSG_DONTWAIT);
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
-    if (got <= 0 || (guest->second.done += static_cast<std::size_t>(got)) > limits_.forget_bytes) close(guest);
+    if (got > 0) guest->second.done += static_cast<std::size_t>(got);
+    if (got <= 0 || guest->second.done > limits_.forget_bytes) close(guest);
 }
 
 void Lobby::hand_over(Guests::iterator guest, bool timed_out, bool ended)
@@ -311,7 +312,7 @@ void Lobby::close(Guests::iterator guest)
     changed_.notify_all();
 }
 
-void Lobby::watch(int socket, Phase phase, bool watched)
+void Lobby::watch(int socket, Phase phase, bool watched) const
 {
     epoll_event event{};
     event.events = phase == Phase::sending ? EPOLLOUT : EPOLLIN;

@@ -84,15 +84,15 @@ private:
     using Guests = std::unordered_map<int, Guest>;
 
     void run();
-    void wake();
+    void wake() const;
     Clock::time_point end_of(const Guest& guest) const;
     Clock::time_point end_of_phase(const Guest& guest) const;
-    void begin_phase(Guests::iterator guest, Phase phase, bool watched);
+    void begin_phase(Guests::iterator entry, Phase phase, bool watched);
     void move_on(Guests::iterator guest);
     void read_headers(Guests::iterator guest);
-    void send(Guests::iterator guest);
+    void send(Guests::iterator entry);
     void forget(Guests::iterator guest);
-    void begin_forgetting(Guests::iterator guest);
+    void begin_forgetting(Guests::iterator entry);
     void hand_over(Guests::iterator guest, bool timed_out, bool ended);
     void end_late(Clock::time_point now);
     bool make_room();
@@ -100,7 +100,7 @@ private:
     Clock::time_point next_room() const;
     void give_up_an_answer();
     void close(Guests::iterator guest);
-    void watch(int socket, Phase phase, bool watched);
+    void watch(int socket, Phase phase, bool watched) const;
 
     const LobbyLimits limits_;
     const Serve serve_;

@@ -172,7 +172,7 @@ void Service::post_scene(const Request& request, Response& response)
     const auto admitted = gate_.admit();
     SharedBytes body = read_body(request);
     const std::string form = boundary_of(connection.content_type);
-    const std::string id = id_of(parse_multipart(body, form, static_cast<std::size_t>(options_.parts)));
+    std::string id = id_of(parse_multipart(body, form, static_cast<std::size_t>(options_.parts)));
     auto scene = scenes_.find(id, true);
     response.status = scene ? 200 : 201;
     if (!scene) {

@@ -55,7 +55,7 @@ void Service::set_routes()
         return status;
     });
     http_->set_error_handler([this](const Request&, Response& response) { answer_for_library(response, options_); });
-    http_->set_exception_handler([](const Request&, Response& response, std::exception_ptr) { answer(response, defect()); });
+    http_->set_exception_handler([](const Request&, Response& response, const std::exception_ptr&) { answer(response, defect()); });
     http_->set_logger([this](const Request& request, const Response& response) { finished(request, response); });
     http_->set_post_routing_handler([](const Request&, Response& response) {
         const Connection& connection = Connection::current();
@@ -93,7 +93,7 @@ void Service::set_routes()
 
 void Service::set_documents()
 {
-    const auto serve_document = [this](std::string path, std::string bytes, std::string type) {
+    const auto serve_document = [this](const std::string& path, std::string bytes, std::string type) {
         const bool html = type.starts_with("text/html");
         const auto document = std::make_shared<const Document>(std::move(bytes), std::move(type));
         http_->Get(path, [document, html](const Request& request, Response& response) {

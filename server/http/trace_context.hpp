@@ -12,7 +12,7 @@ struct TraceContext {
 };
 
 // Nothing for a header that is not valid, which then is to be ignored.
-std::optional<TraceContext> trace_context_from(std::string_view traceparent);
+std::optional<TraceContext> trace_context_from(std::string_view header);
 
 // The header that names our own part of the trace.
 std::string traceparent_of(const TraceContext& context, std::string_view span_id);

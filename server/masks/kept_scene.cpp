@@ -17,6 +17,7 @@ namespace {
 std::vector<std::pair<std::string, std::string>> copied(std::span<const Part> parts)
 {
     std::vector<std::pair<std::string, std::string>> copy;
+    copy.reserve(parts.size());
     for (const Part& part : parts) copy.emplace_back(part.name, part.bytes);
     return copy;
 }
@@ -24,6 +25,7 @@ std::vector<std::pair<std::string, std::string>> copied(std::span<const Part> pa
 std::vector<Part> views(const std::vector<std::pair<std::string, std::string>>& owned)
 {
     std::vector<Part> parts;
+    parts.reserve(owned.size());
     for (const auto& [name, bytes] : owned) parts.push_back({name, bytes});
     return parts;
 }

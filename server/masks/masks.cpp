@@ -61,12 +61,12 @@ private:
 
 // Calls it with the hooks of a run of the task: its cache, and the deadline between steps.
 template <class Call>
-void with_hooks(const MaskTask& task, const Deadline& deadline, std::function<void(const WorkAmount&)> estimated, const Call& call)
+void with_hooks(const MaskTask& task, const Deadline& deadline, const std::function<void(const WorkAmount&)>& estimated, const Call& call)
 {
     TaskKeeper keeper(task);
     call(MaskHooks{.keeper = task.cache ? &keeper : nullptr,
                    .before = [&](std::string_view next) { deadline.check(next); },
-                   .estimated = std::move(estimated)});
+                   .estimated = estimated});
 }
 
 // The mask of all the task's lights together, which a run gives last.
@@ -102,6 +102,7 @@ Scene decode_scene(std::span<const Part> parts, const Options& options, const De
 std::vector<std::size_t> chosen_from(const std::vector<MaskLight>& lights, const MaskChoice& choice)
 {
     std::vector<Choosable> choosable;
+    choosable.reserve(lights.size());
     for (const MaskLight& light : lights) choosable.push_back({light.name, static_cast<int>(frames_of(light.light))});
     return chosen_from(choosable, choice);
 }

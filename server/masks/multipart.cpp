@@ -114,7 +114,7 @@ std::string boundary_of(std::string_view content_type)
     if (!same(kind, "multipart/form-data"))
         throw Problem(415, "media_type", "Content-Type: expected multipart/form-data with a part `scene` and one for each image it names");
     content_type = trimmed(content_type);
-    const std::string boundary = parameter(content_type, kind, "boundary").value_or("");
+    std::string boundary = parameter(content_type, kind, "boundary").value_or("");
     // RFC 2046, 5.1.1; the space, which it allows inside, no client uses.
     const bool allowed = std::ranges::all_of(boundary, [](char c) {
         return (c >= '0' && c <= '9') || (lower(c) >= 'a' && lower(c) <= 'z') ||

@@ -52,7 +52,7 @@ private:
         std::shared_ptr<Scene> scene;
         Clock::time_point used;
     };
-    std::list<Entry>::iterator at(std::string_view id);
+    typename std::list<Entry>::iterator at(std::string_view id);
     void tidy_locked();
     std::uint64_t bytes_locked() const;
 

@@ -78,6 +78,7 @@ public:
         const auto watched = watch_.until(deadline);
         limit_processor(static_cast<std::uint64_t>(call.seconds + 2) * std::max(std::thread::hardware_concurrency(), 1U));
         std::vector<SharedBytes> shared;
+        shared.reserve(std::max(files.size(), std::size_t{2}));
         for (Descriptor& file : files) shared.emplace_back(std::move(file));
         shared.resize(2);
         try {

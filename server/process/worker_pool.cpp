@@ -13,6 +13,7 @@
 #include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <penumbra/error.hpp>
 
@@ -20,8 +21,6 @@
 #include "process/problem.hpp"
 #include "process/wait.hpp"
 #include "process/watch.hpp"
-
-extern char** environ;
 
 namespace penumbra::server {
 namespace {
@@ -248,6 +247,7 @@ void WorkerPool::spawn(Worker& worker, bool builder)
     std::vector<std::string> words{options_.program, (builder ? "--builder=" : "--worker=") + folder};
     words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
     std::vector<char*> pointers;
+    pointers.reserve(words.size() + 1);
     for (std::string& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);
     // dup2 to itself would leave it to be closed at exec.
@@ -385,7 +385,7 @@ Channel::Got WorkerPool::Lease::wait(Message& answer, const Deadline& deadline, 
         end = std::min(end, now + std::chrono::milliseconds(100)); // the service's end is looked for now and then: it shortens the wait
         if (step != steps_down.end()) {
             const auto left = step->after - (processor_time(worker_->process) - used_before);
-            if (left <= left.zero()) {
+            if (left <= Clock::duration::zero()) {
                 lower_priority(worker_->process, step++->steps);
                 lowered_ = true;
             } else {

@@ -128,7 +128,7 @@ public:
     }
 
     // Channels [first, end) as `type`.
-    void read(int part, int first, int end, OIIO::TypeDesc type, void* samples)
+    void read(int part, int first, int end, const OIIO::TypeDesc& type, void* samples)
     {
         const bool done = input_->read_image(part, 0, first, end, type, samples);
         // A truncated TIFF reads "true" with zeros: the error alone tells.
@@ -194,7 +194,7 @@ std::vector<ImagePart> parts_of(std::span<const std::byte> bytes, ImageFormat fo
     return parts_of(source, choice, where);
 }
 
-template <class Sample> void read_channel(Source& source, const PlanePick& pick, std::size_t at, OIIO::TypeDesc type, std::vector<float>& samples)
+template <class Sample> void read_channel(Source& source, const PlanePick& pick, std::size_t at, const OIIO::TypeDesc& type, std::vector<float>& samples)
 {
     const std::size_t channels = pick.channels.size();
     std::vector<Sample> plane(samples.size() / channels);

@@ -126,7 +126,7 @@ inline std::vector<std::string> library_names(const std::string& line, const Fin
 
 inline std::vector<NamedFile> files_of_obj(std::string_view text, const FindBytes& find)
 {
-    if (text.find("mtllib") == text.npos) return {};
+    if (text.find("mtllib") == std::string_view::npos) return {};
     std::set<std::string, std::less<>> used;
     std::vector<std::string> libraries;
     for (text = without_mark(text); !text.empty();) {
