@@ -103,8 +103,15 @@ inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const flo
         *end1 = select_lanes(*end1, select_lanes(*end0, (floatn)(0.0f), (place > a0) & (intn)(d0 > d1 ? -1 : 0)), own);
 }
 
-// Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity.
-inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2 scale, const Receivers* receivers)
+// Up to where a patch whose disparities differ by `steps` may show the surface that the receivers lie on.
+inline floatn surface_edge(const Limits* limits, const float steps)
+{
+    const floatn own = limits->least + steps;
+    return select_lanes(limits->edge, own, (own > limits->edge) & (limits->edge > limits->least)); // where planes are known
+}
+
+// Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity. own: STEPS_OF_SURFACE as the bias has it.
+inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2 scale, const float own, const Receivers* receivers)
 {
     const floatn xi = receivers->xi, eta = receivers->eta, d = receivers->d, least = receivers->limits.least;
     const floatn over = fma((floatn)(0.5f * (p->a0 + p->a1)), receivers->limits.lean_xi, fma((floatn)(0.5f * (p->b0 + p->b1)), receivers->limits.lean_eta, -receivers->limits.level));
@@ -115,8 +122,7 @@ inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2
         v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
         u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
         u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
-        const float steps = STEPS_OF_SURFACE * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low));
-        const floatn reached = least + steps, edge = select_lanes(receivers->limits.edge, reached, reached > receivers->limits.edge);
+        const floatn edge = surface_edge(&receivers->limits, own * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low)));
         if (!ALL(edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
             end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, edge);
             end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, edge);
@@ -189,13 +195,13 @@ inline Rectangle rectangle_of_texel(const float middle, const float4 edges, cons
     return rectangle;
 }
 
-// Whether all of a patch counts for each of LANES receivers, or none of it.
-inline bool on_one_side(__global const MicroPatch* p, const Rectangle* r, const Limits* limits)
+// Whether all of a patch counts for each of LANES receivers and shows no surface of theirs, or none of it counts. own: as above.
+inline bool on_one_side(__global const MicroPatch* p, const Rectangle* r, const float own, const Limits* limits)
 {
     const floatn middle = fma((floatn)(0.5f * (r->a0 + r->a1)), limits->lean_xi, fma((floatn)(0.5f * (r->b0 + r->b1)), limits->lean_eta, -limits->level));
     const floatn half_plane = fma(fabs(limits->lean_xi), (floatn)(0.5f * (r->a1 - r->a0)), fabs(limits->lean_eta) * (0.5f * (r->b1 - r->b0)));
     const floatn near = limits->facing * p->reach, far = limits->facing * p->least;
-    const intn above = (p->least > limits->edge) & (middle - half_plane > fmax(near, far)), below = (p->reach <= limits->least) | (middle + half_plane <= fmin(near, far));
+    const intn above = (p->least > surface_edge(limits, 2.0f * own * (p->reach - p->least))) & (middle - half_plane > fmax(near, far)), below = (p->reach <= limits->least) | (middle + half_plane <= fmin(near, far));
     return ALL(above | below);
 }
 
@@ -333,6 +339,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
     const float2 scale = (float2)(occluders.light_scale_x, occluders.light_scale_y);
     const int2 size = (int2)(occluders.width, occluders.height);
     const Levels levels = levels_of(size);
+    const float steps_of_surface = STEPS_OF_SURFACE * bias;
     uint count = 0;
     Receivers own[ITEM_ROWS];
     float8 boxes[ITEM_ROWS];
@@ -391,7 +398,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                         whole = small || (p->flags & SOLID) || ((p->flags & FULL) && may_be_one(search, p->reach, p->least));
                         if (whole) {
                             rectangle = rectangle_of(*p, at.x, at.y, cell);
-                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(p, &rectangle, &own[top + row].limits);
+                            for (int row = 0; row < together && whole; ++row) whole = over[row] || on_one_side(p, &rectangle, steps_of_surface, &own[top + row].limits);
                         }
                     }
                     if (!whole) {
@@ -405,7 +412,7 @@ __kernel void soft_shadow_union(const ReceiverView receivers, const OccluderView
                     count += together;
                     for (int row = 0; row < together; ++row) {
                         if (over[row]) continue;
-                        hide(bits[row], &rectangle, at.z == 0, scale, &own[top + row]);
+                        hide(bits[row], &rectangle, at.z == 0, scale, steps_of_surface, &own[top + row]);
                         if (at.z < 3 || !all_hidden(bits[row], own[top + row].d)) continue;
                         over[row] = true;
                         --rows_left;

@@ -73,6 +73,7 @@ class Page(PageTest):
             self.assertEqual(self.problem(), "", kind)
 
     def test_a_light_that_a_technique_does_not_take_is_said_so(self):
+        self.change(lambda: Select(self.find("#technique_a [name=kind]")).select_by_value("soft_shadow_volume"))
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, "#technique_a .notice"), [])
         Select(self.find("[name=light_kind]")).select_by_value("directional")
         self.assertIn("takes no directional light", self.find("#technique_a .notice").text)
