@@ -122,7 +122,8 @@ inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2
         v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
         u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
         u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
-        const floatn edge = surface_edge(&receivers->limits, own * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low)));
+        const floatn reached = surface_edge(&receivers->limits, own * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low)));
+        const floatn edge = select_lanes((floatn)(0.0f), reached, receivers->limits.edge > least);
         if (!ALL(edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
             end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, edge);
             end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, edge);
