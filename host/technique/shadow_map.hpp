@@ -17,7 +17,7 @@ struct PreparedShadowMap {
     OccluderMap map;
 };
 
-PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& depth, const ShadowMap& settings);
+PreparedShadowMap prepare_shadow_map(opencl::Work& work, const OccluderDepth& given, const ShadowMap& settings);
 
 // Writes visibility, receivers.view.height x receivers.view.width.
 void shade_shadow_map(opencl::Work& work, const PreparedShadowMap& prepared, const ReceiverPoints& receivers, const cl::Buffer& visibility);

@@ -27,7 +27,7 @@ struct PreparedSoftShadowMap {
     PreparedUnion united;    // of the union
 };
 
-PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& depth, const SoftShadowMap& settings, const Image* emission = nullptr);
+PreparedSoftShadowMap prepare_soft_shadow_map(opencl::Work& work, const OccluderDepth& given, const SoftShadowMap& settings, const Image* emission = nullptr);
 
 // Writes visibility, receivers.view.height x receivers.view.width, of a textured light with its channels. With `counts` it waits for the device to fill them in.
 void shade_soft_shadow_map(opencl::Work& work, const PreparedSoftShadowMap& prepared, const ReceiverPoints& receivers,
