@@ -76,7 +76,6 @@ const std::vector<std::string> rival{"ray_traced:samples=16,adaptive=true,first_
 
 } // namespace
 
-// The ray-traced mask, from $PENUMBRA_BENCH_REFERENCES where it was kept by a run before.
 Image suite_reference(const Engine& engine, const SuiteScene& scene)
 {
     const char* folder = std::getenv("PENUMBRA_BENCH_REFERENCES");

@@ -89,14 +89,14 @@ typedef struct {
     Limits limits;
 } Receivers;
 
-// The ends in the light of a patch, from a0 with disparity d0 to a1 with d1, that shows the surface on which the receivers lie: it reaches to
-// their place, or nearly, and goes on there up to `edge`. It is seen edge-on: it hides what lies beyond its upper end, where it does not fall away from there. By its lower end, which is
-// hardly before the receiver, it would hide all that shines on it.
-inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const float a1, const float d0, const float d1, const floatn place, const floatn edge)
+// The ends in the light of a patch, from a0 with disparity d0 to a1 with d1, that shows the surface on which the receivers lie: one of its edges is not above
+// `edge` (`low`), it reaches to their place, or nearly, and goes on there up to `edge`. It is seen edge-on: it hides what lies beyond its upper end, where it does
+// not fall away from there. By its lower end, which is hardly before the receiver, it would hide all that shines on it.
+inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const float a1, const float d0, const float d1, const floatn place, const floatn edge, const intn low)
 {
     const float wide = a1 - a0;
     const floatn here = fma(place - a0, (floatn)((d1 - d0) / wide), (floatn)(d0));
-    const intn own = (here <= edge) & (place > a0 - BESIDE_RECEIVER * wide) & (place < a1 + BESIDE_RECEIVER * wide);
+    const intn own = low & (here <= edge) & (place > a0 - BESIDE_RECEIVER * wide) & (place < a1 + BESIDE_RECEIVER * wide);
     if (d0 < d1)
         *end0 = select_lanes(*end0, select_lanes(*end1, (floatn)(SIDE), place < a1), own);
     else
@@ -107,7 +107,7 @@ inline void end_on_surface(floatn* end0, floatn* end1, const float a0, const flo
 inline floatn surface_edge(const Limits* limits, const float steps)
 {
     const floatn own = limits->least + steps;
-    return select_lanes(limits->edge, own, (own > limits->edge) & (limits->edge > limits->least)); // where planes are known
+    return select_lanes(limits->edge, own, own > limits->edge);
 }
 
 // Sets what a rectangle hides from LANES receivers. plain: each of its edges has one disparity. own: STEPS_OF_SURFACE as the bias has it.
@@ -122,11 +122,11 @@ inline void hide(uintn* bits, const Rectangle* p, const bool plain, const float2
         v_top = samples_at(p->b1, eta, (floatn)(p->top.low), d, least, scale.y);
         u_left = samples_at(p->a0, xi, (floatn)(p->left.low), d, least, scale.x);
         u_right = samples_at(p->a1, xi, (floatn)(p->right.low), d, least, scale.x);
-        const floatn reached = surface_edge(&receivers->limits, own * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low)));
-        const floatn edge = select_lanes((floatn)(0.0f), reached, receivers->limits.edge > least);
-        if (!ALL(edge < fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low)))) {
-            end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, edge);
-            end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, edge);
+        const floatn edge = surface_edge(&receivers->limits, own * (fabs(p->right.low - p->left.low) + fabs(p->top.low - p->bottom.low)));
+        const intn low = edge >= fmin(fmin(p->left.low, p->right.low), fmin(p->bottom.low, p->top.low));
+        if (!NONE(low)) {
+            end_on_surface(&u_left, &u_right, p->a0, p->a1, p->left.low, p->right.low, xi, edge, low);
+            end_on_surface(&v_bottom, &v_top, p->b0, p->b1, p->bottom.low, p->top.low, eta, edge, low);
         }
     } else {
         v_bottom = outermost(p->b0, eta, p->bottom, true, d, least, scale.y);

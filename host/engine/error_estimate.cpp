@@ -1,11 +1,13 @@
-// Rays are cast at a few hundred pixels, most of them in penumbrae, the others where the mask is black, and where the mask says lit and may be wrong. What the rays' own noise adds is taken off; the pixels
-// that are off most get more rays, so that the 99 % are no noise. It measures whatever the error comes from: texels, patterns, tolerance, surfaces that no map shows.
+// Rays are cast at a few hundred pixels, most of them in penumbrae, the others where the mask is black, and where it says lit and may be wrong. What the rays' own
+// noise adds is taken off; the pixels that are off most get more rays, so that the 99 % are no noise. It measures whatever the error comes from: texels, patterns, tolerance, surfaces that no map shows.
 #include "engine/error_estimate.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <span>
+
+#include <penumbra/metrics.hpp>
 
 #include "engine/geometry.hpp"
 #include "engine/state.hpp"
@@ -15,9 +17,8 @@ namespace penumbra {
 namespace {
 
 constexpr std::size_t most_between = 352, most_dark = 64, most_lit = 96; // pixels: in penumbrae, without any light, with all of it
-constexpr int first_rays = 512, more_rays = 4096;      // a pixel; the first twice
-constexpr std::size_t most_again = 48;                 // pixels
-constexpr float dark_below = 0.999F;                 // of compare (metrics.hpp)
+constexpr int first_rays = 512, more_rays = 4096; // a pixel; the first twice
+constexpr std::size_t most_again = 48;            // pixels
 
 // Pixels of a mask, and how many of its own each stands for.
 struct Sample {
@@ -44,11 +45,11 @@ public:
     const float* at(std::uint32_t pixel) const { return mask_.pixels.data() + pixel * channels_; }
     bool is_dark(const float* values) const
     {
-        return std::any_of(values, values + channels_, [](float v) { return v < dark_below; });
+        return std::any_of(values, values + channels_, [](float v) { return static_cast<double>(v) < shadow_below; });
     }
     bool is_black(const float* values) const
     {
-        return std::all_of(values, values + channels_, [](float v) { return v <= 1 - dark_below; });
+        return std::all_of(values, values + channels_, [](float v) { return static_cast<double>(v) <= 1 - shadow_below; });
     }
     double apart(const float* a, const float* b) const
     {
@@ -168,6 +169,8 @@ bool is_union(const Technique& technique)
 }
 
 } // namespace
+
+double rays_of_estimate() { return static_cast<double>(most_between + most_dark + most_lit) * 2 * first_rays + static_cast<double>(most_again) * more_rays; }
 
 std::optional<ErrorEstimate> estimate_error(const Engine& engine, const MaskJob& job, const MaskLight& light, const Light& now, const Prepared& prepared, const Receivers& receivers,
                                             const Image& image)

@@ -12,4 +12,7 @@ namespace penumbra {
 std::optional<ErrorEstimate> estimate_error(const Engine& engine, const MaskJob& job, const MaskLight& light, const Light& now, const Prepared& prepared, const Receivers& receivers,
                                             const Image& mask);
 
+// Rays that it casts at the most, where objects cast.
+double rays_of_estimate();
+
 } // namespace penumbra

@@ -286,7 +286,10 @@ std::vector<WorkAmount> work_of(const MaskJob& job)
     for (const MaskLight& light : job.lights) shape.occluders.push_back({light.occluders->width, light.occluders->height});
     shape.bound = job.bound;
     shape.edges = edges_of(job, shape);
-    return std::visit([&](const auto& settings) { return work(settings, shape); }, job.technique);
+    std::vector<WorkAmount> all = std::visit([&](const auto& settings) { return work(settings, shape); }, job.technique);
+    if (job.error_estimate && job.geometry.state().any(&Object::casts))
+        all.push_back({.key = "error_estimate", .amount = shape.lights() * rays_of_estimate(), .unit = WorkAmount::Unit::rays, .what = "rays"});
+    return all;
 }
 
 Mask Engine::mask(const Scene& scene) const { return mask(scene, technique_from(scene.technique)); }

@@ -22,8 +22,6 @@ template <class... Parts> std::string text(const Parts&... parts)
     return out.str();
 }
 
-constexpr double shadow_below = 0.999;
-
 // Two float32 values in [0, 1] that stand for numbers a given step apart are each rounded by at most 2^-25 (half a unit in the last place
 // below 1). Their difference may therefore exceed the step by 2^-24 without the step being larger.
 constexpr double rounding_slack = 0x1p-24;

@@ -13,9 +13,9 @@
 namespace penumbra::test {
 namespace {
 
-Object quad(const Vec3& center, const Vec3& half_u, const Vec3& half_v, bool casts)
+Object sheet(const Vec3& center, const Vec3& half_u, const Vec3& half_v, bool casts)
 {
-    Object object = object_of({center - half_u - half_v, center + half_u - half_v, center + half_u + half_v, center - half_u + half_v}, {{0, 1, 2}, {0, 2, 3}});
+    Object object = body({center - half_u - half_v, center + half_u - half_v, center + half_u + half_v, center - half_u + half_v}, {{0, 1, 2}, {0, 2, 3}});
     object.casts = casts;
     object.receives = !casts;
     return object;
@@ -29,7 +29,7 @@ Scene over_floor(std::vector<Object> casters, const Light& light, int texels)
         caster.receives = false;
         scene.objects.push_back(std::move(caster));
     }
-    scene.objects.push_back(quad({0, 0, 0}, {4, 0, 0}, {0, 0, -4}, false));
+    scene.objects.push_back(sheet({0, 0, 0}, {4, 0, 0}, {0, 0, -4}, false));
     scene.occluders.width = scene.occluders.height = texels;
     scene.receivers.camera = PinholeCamera{.frame = {.origin = {0, 6, 0}, .x = {1, 0, 0}, .y = {0, 0, -1}, .z = {0, 1, 0}}, .tan_half_fov = {0.4, 0.4}, .shift = {}};
     scene.receivers.width = scene.receivers.height = 120;
@@ -41,29 +41,23 @@ RectangleLight rectangle(double half) { return {.center = {0.2, 6, 0.1}, .half_u
 std::vector<Object> balls()
 {
     std::vector<Object> all;
-    for (int i = 0; i < 9; ++i) {
-        Object one = ball(2, {0, 0, 0});
-        for (auto& p : one.mesh.positions) p = p * 0.25F + Imath::V3f(static_cast<float>(i % 3) * 0.7F - 0.7F, 1.5F + 0.3F * static_cast<float>(i % 2), static_cast<float>(i) / 4.5F - 0.9F);
-        all.push_back(std::move(one));
-    }
+    for (int i = 0; i < 9; ++i)
+        all.push_back(body(penumbra::sphere({(i % 3) * 0.7 - 0.7, 1.5 + 0.3 * (i % 2), i / 4.5 - 0.9}, 0.25, 3)));
     return all;
 }
 
 std::vector<Object> bars()
 {
     std::vector<Object> all;
-    for (int i = 0; i < 8; ++i) all.push_back(quad({-1.1 + 0.3 * i, 2, 0}, {0.05, 0, 0}, {0, 0.2, -1}, true));
+    for (int i = 0; i < 8; ++i) all.push_back(sheet({-1.1 + 0.3 * i, 2, 0}, {0.05, 0, 0}, {0, 0.2, -1}, true));
     return all;
 }
 
 std::vector<Object> bunny()
 {
-    Object body;
-    body.name = "bunny";
-    body.mesh = read_mesh(PENUMBRA_BUNNY, "bunny");
-    for (auto& p : body.mesh.positions) p.y += 2;
-    body.casts = true;
-    return {body};
+    Object above = body(read_mesh(PENUMBRA_BUNNY, "bunny"));
+    for (auto& p : above.mesh.positions) p.y += 2;
+    return {above};
 }
 
 struct Case {
@@ -78,7 +72,7 @@ std::vector<Case> cases()
             all.push_back({"balls", over_floor(balls(), rectangle(half), texels)});
             all.push_back({"bars", over_floor(bars(), rectangle(half), texels)});
             all.push_back({"bunny", over_floor(bunny(), rectangle(half), texels)});
-            all.push_back({"sheet", over_floor({quad({0, 1.4, 0}, {0.8, 0.3, 0}, {0, 0.2, -0.7}, true)}, rectangle(half), texels)});
+            all.push_back({"sheet", over_floor({sheet({0, 1.4, 0}, {0.8, 0.3, 0}, {0, 0.2, -0.7}, true)}, rectangle(half), texels)});
         }
     return all;
 }

@@ -33,15 +33,12 @@ TEST(MovingCaster, ChangesNoPixelMuchMoreThanRaysDo)
             for (int frame = 0; frame < 8; ++frame) {
                 Scene scene;
                 scene.light = RectangleLight{.center = {0, 8, 0}, .half_u = {half, 0, 0}, .half_v = {0, 0, -half}, .emission = {}};
-                Object body;
-                body.name = "bunny";
-                body.mesh = bunny;
-                for (auto& p : body.mesh.positions) p += Imath::V3f(0.02F * static_cast<float>(frame), 2.5F, 0.01F * static_cast<float>(frame));
-                body.casts = true;
-                body.receives = false;
-                Object floor = object_of({{-4, 0, -4}, {-4, 0, 4}, {4, 0, 4}, {4, 0, -4}}, {{0, 1, 2}, {0, 2, 3}});
+                Object caster = body(bunny);
+                for (auto& p : caster.mesh.positions) p += Imath::V3f(0.02F * static_cast<float>(frame), 2.5F, 0.01F * static_cast<float>(frame));
+                caster.receives = false;
+                Object floor = body({{-4, 0, -4}, {-4, 0, 4}, {4, 0, 4}, {4, 0, -4}}, {{0, 1, 2}, {0, 2, 3}});
                 floor.casts = false;
-                scene.objects = {body, floor};
+                scene.objects = {caster, floor};
                 scene.occluders.width = scene.occluders.height = texels;
                 scene.occluders.camera = LightCamera{.tan_half_fov = Vec2(0.4, 0.4), .half_extent = {}, .center = {}};
                 scene.receivers.camera = PinholeCamera{.frame = {.origin = {0, 6, 0}, .x = {1, 0, 0}, .y = {0, 0, -1}, .z = {0, 1, 0}}, .tan_half_fov = {0.4, 0.4}, .shift = {}};

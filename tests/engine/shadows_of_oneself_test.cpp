@@ -7,6 +7,7 @@
 
 #include <penumbra/engine.hpp>
 
+#include "engine/state.hpp"
 #include "io/mesh_io.hpp"
 #include "support/bodies.hpp"
 
@@ -23,7 +24,7 @@ Object ridges(int count)
     for (int i = 0; i <= 2 * count; ++i)
         for (const double z : {1.2, -1.2}) corners.emplace_back(1.2 * (i - count) / count, i % 2 ? 0.25 : 0, z);
     for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(2 * count); ++i) facets.insert(facets.end(), {{2 * i, 2 * i + 2, 2 * i + 3}, {2 * i, 2 * i + 3, 2 * i + 1}});
-    return object_of(std::move(corners), std::move(facets));
+    return body(corners, std::move(facets));
 }
 
 Scene scene_of(const Light& light, Object object, int texels)
@@ -82,7 +83,7 @@ TEST(ShadowsOfOneself, ABallIsDarkenedByItsHorizonsAlone)
 {
     for (const int texels : {128, 256, 512})
         for (const Light& light : {Light(sphere(20)), Light(sphere(2)), Light(rectangle())}) {
-            const Difference off = difference(scene_of(light, ball(3, {0, 0, 0}), texels), exact());
+            const Difference off = difference(scene_of(light, body(penumbra::sphere({0, 0, 0}, 1, 4)), texels), exact());
             EXPECT_LT(off.mean, 0.006) << texels;
             EXPECT_LT(std::abs(off.bias), 0.003) << texels;
             EXPECT_EQ(off.alone, 0) << texels;
@@ -93,7 +94,7 @@ TEST(ShadowsOfOneself, ABoxesFaces)
 {
     for (const double z : {0.4, 0.7, 1.}) {
         const RectangleLight above{.center = {0.1, 4, z}, .half_u = {1, 0, 0}, .half_v = {0, 0, -1}, .emission = {}};
-        const Difference off = difference(scene_of(above, box({0, 0, 0}, 0.7), 256), exact());
+        const Difference off = difference(scene_of(above, body(box({-0.7, -0.7, -0.7}, {0.7, 0.7, 0.7})), 256), exact());
         EXPECT_LT(off.mean, 0.006);
         EXPECT_EQ(off.alone, 0);
     }
@@ -103,7 +104,7 @@ TEST(ShadowsOfOneself, ABoxesFaces)
 TEST(ShadowsOfOneself, OfMapsThatAreReduced)
 {
     for (const int resolution : {100, 150, 173, 255}) {
-        const Difference off = difference(scene_of(rectangle(), ball(3, {0, 0, 0}), 256), SoftShadowMap{.resolution = resolution, .tolerance = 0});
+        const Difference off = difference(scene_of(rectangle(), body(penumbra::sphere({0, 0, 0}, 1, 4)), 256), SoftShadowMap{.resolution = resolution, .tolerance = 0});
         EXPECT_LT(off.mean, 0.006) << resolution;
         EXPECT_LE(off.alone, 2) << resolution;
     }
@@ -125,13 +126,28 @@ TEST(ShadowsOfOneself, RidgesHideEachOthersFeet)
 // what the horizon cuts was taken: .032, .022 too bright.)
 TEST(ShadowsOfOneself, OfABunny)
 {
-    Object body;
-    body.name = "bunny";
-    body.mesh = read_mesh(PENUMBRA_BUNNY, "bunny");
-    const Difference off = difference(scene_of(sphere(20), body, 512), exact());
+    const Difference off = difference(scene_of(sphere(20), body(read_mesh(PENUMBRA_BUNNY, "bunny")), 512), exact());
     EXPECT_LT(off.mean, 0.02);
     EXPECT_LT(std::abs(off.bias), 0.011);
     EXPECT_EQ(off.alone, 0);
+}
+
+// Whatever receivers lie in one tile, and in one vector, with it.
+TEST(ShadowsOfOneself, DoNotDependOnTheReceiversBeside)
+{
+    for (const Light& light : {Light(sphere(20)), Light(rectangle())}) {
+        Scene scene = scene_of(light, body(read_mesh(PENUMBRA_BUNNY, "bunny")), 256);
+        scene.receivers = with_depth(scene.receivers, light, Geometry(scene.objects));
+        const Prepared prepared = engine().prepare(scene, exact());
+        const Image whole = engine().shade(prepared, scene.receivers).visibility;
+        // A fifth of the image at a time, from its end on.
+        for (std::uint32_t first = 0; first < 5; ++first) {
+            std::vector<std::uint32_t> pixels;
+            for (std::uint32_t pixel = side * side - 1 - first; pixel < side * side; pixel -= 5) pixels.push_back(pixel);
+            const std::vector<float> some = shade_pixels(prepared, scene.receivers, pixels);
+            for (std::size_t i = 0; i < pixels.size(); ++i) ASSERT_EQ(some[i], whole.pixels[pixels[i]]) << pixels[i];
+        }
+    }
 }
 
 } // namespace

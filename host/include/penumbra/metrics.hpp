@@ -8,8 +8,10 @@
 
 namespace penumbra {
 
-// Differences are test - reference, over all channels. The _shadow figures are over pixels whose visibility is below 0.999 in either
-// image; without any such pixel they are 0.
+// A pixel with a visibility below this is in shadow.
+constexpr double shadow_below = 0.999;
+
+// Differences are test - reference, over all channels. The _shadow figures are over pixels that are in shadow in either image; without any such pixel they are 0.
 struct Metrics {
     double mae_shadow = 0, rmse_shadow = 0, bias_shadow = 0;
     double mae = 0, rmse = 0;
